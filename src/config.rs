@@ -1,0 +1,355 @@
+//! Every number that can be chosen: the paper's hyperparameters (§B.1, the defaults) and what the paper leaves open.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result};
+
+/// One configurable value, for `paws config` and for the docs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// `block.key`.
+    pub key: String,
+    /// The value as TOML.
+    pub value: String,
+    /// Unit, or "-".
+    pub unit: &'static str,
+    /// Section of the paper, or "ours" where the paper has no number.
+    pub section: &'static str,
+    /// What it does.
+    pub meaning: String,
+}
+
+/// Declares one block of the config with its defaults, units and sources in one place.
+macro_rules! block {
+    ($(#[doc = $block_doc:literal])* $block:ident, $name:literal, {
+        $($(#[doc = $doc:literal])* $field:ident: $ty:ty = $default:expr, $unit:literal, $section:literal;)*
+    }) => {
+        $(#[doc = $block_doc])*
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct $block { $($(#[doc = $doc])* pub $field: $ty,)* }
+
+        impl Default for $block {
+            fn default() -> Self { Self { $($field: $default,)* } }
+        }
+
+        impl $block {
+            fn rows(&self, rows: &mut Vec<Row>) {
+                $(rows.push(Row {
+                    key: concat!($name, ".", stringify!($field)).to_owned(),
+                    value: toml::Value::try_from(&self.$field).map(|v| v.to_string()).unwrap_or_default(),
+                    unit: $unit,
+                    section: $section,
+                    meaning: [$($doc.trim()),*].join(" "),
+                });)*
+            }
+        }
+    };
+}
+
+block! {
+    /// Fingertips to a smoothed trajectory (§3.1, §A.2).
+    Hands, "hands", {
+        /// Correlation time of the hand's velocity. The paper prints "length scale 10.0 m"; a length cannot be one, ten
+        /// frames at 30 fps can.
+        correlation_secs: f64 = 1.0 / 3.0, "s", "B.1";
+        /// Stationary standard deviation of the hand's velocity. The paper prints "q = 0.01 m": 0.01 m a frame at 30 fps.
+        speed_std_m_per_s: f64 = 0.3, "m/s", "B.1";
+        /// Standard deviation of an observed fingertip mean.
+        observation_std_m: f64 = 0.05, "m", "B.1";
+        /// p-value of the chi-square gate with 3 degrees of freedom.
+        gate_p_value: f64 = 0.05, "-", "B.1";
+        /// Rejections in a row after which the filter starts again (0 = never).
+        restart_after: usize = 3, "samples", "ours";
+        /// Use the detector's contact flags; false takes every sample of a clip.
+        use_contact: bool = true, "-", "A.2";
+        /// Fewer samples in contact than this give no answer.
+        min_samples: usize = 3, "samples", "ours";
+    }
+}
+
+block! {
+    /// Where the touched furniture is (§3.1, §A.3).
+    Localization, "localization", {
+        /// Edge of a voxel.
+        voxel_m: f64 = 0.05, "m", "B.1";
+        /// A voxel seen in at least this many local frames is confident.
+        min_views: usize = 4, "views", "B.1";
+        /// Local frames per clip.
+        local_frames: usize = 5, "frames", "B.1";
+        /// Local frames from the closed state around the interaction (true), or from the interaction itself as the paper
+        /// has it (false): a part that moves leaves the voxels that would count it.
+        closed_state_frames: bool = true, "-", "ours";
+        /// Global views for the geometry.
+        global_views: usize = 50, "views", "B.1";
+        /// Share of the confident voxels that a global view must have inside its frustum.
+        min_visible_share: f64 = 0.3, "-", "ours";
+        /// Only what lies within this distance of the hand can be the touched furniture.
+        reach_m: f64 = 1.5, "m", "ours";
+        /// Every n-th pixel of the local frames is used.
+        pixel_step: usize = 2, "px", "ours";
+    }
+}
+
+block! {
+    /// Lines and directions (§3.2, §A.4, §A.5, algorithm 1).
+    Geometry, "geometry", {
+        /// Shorter 2D segments are dropped.
+        min_segment_px: f64 = 25.0, "px", "ours";
+        /// Depth samples along a 2D segment.
+        samples_per_segment: usize = 24, "-", "ours";
+        /// Inlier distance of the LO-RANSAC line fits.
+        line_tolerance_m: f64 = 0.03, "m", "ours";
+        /// Draws of the LO-RANSAC line fits.
+        line_draws: usize = 60, "-", "ours";
+        /// Segments of one track differ by no more than this.
+        track_angle_deg: f64 = 10.0, "deg", "ours";
+        /// Distance between segments of one track.
+        track_distance_m: f64 = 0.04, "m", "ours";
+        /// Views that must see a track.
+        min_track_views: usize = 3, "views", "ours";
+        /// Clusters of the per-frame k-means of normals.
+        normal_clusters: usize = 6, "-", "ours";
+        /// Normals sampled per frame.
+        normals_per_frame: usize = 2000, "-", "ours";
+        /// Bandwidth of the mean shift over the frames' axes.
+        mean_shift_deg: f64 = 12.0, "deg", "ours";
+        /// Slab half-width that belongs to a front face.
+        face_tolerance_m: f64 = 0.015, "m", "ours";
+        /// A grip is about this far in front of its face.
+        grip_standoff_m: f64 = 0.035, "m", "ours";
+    }
+}
+
+block! {
+    /// The motion type and the plausible hinges (§3.3, §A.6).
+    Reasoning, "reasoning", {
+        /// Lines offered to the reasoner per clip.
+        candidates: usize = 4, "-", "B.1";
+        /// How often the furniture's name tells the motion type rightly.
+        name_accuracy: f64 = 0.9, "-", "ours";
+        /// Independent samples in one recorded motion: errors of neighbouring frames are correlated.
+        effective_samples: f64 = 8.0, "-", "ours";
+        /// Noise of a smoothed hand position when two explanations of it are compared.
+        hand_std_m: f64 = 0.02, "m", "ours";
+    }
+}
+
+block! {
+    /// Trajectory and geometry to a joint (§3.4, §A.7, §C.2).
+    Inference, "inference", {
+        /// Tolerance of the torus test as a share of the mean radius.
+        torus_tolerance_ratio: f64 = 0.15, "-", "B.1";
+        /// Least torus tolerance.
+        torus_tolerance_min_m: f64 = 0.015, "m", "B.1";
+        /// Largest torus tolerance.
+        torus_tolerance_max_m: f64 = 0.05, "m", "B.1";
+        /// Largest radius of a rotation.
+        max_radius_m: f64 = 1.0, "m", "B.1";
+        /// Least radius of a rotation: nearer lines run through the hand.
+        min_radius_m: f64 = 0.05, "m", "ours";
+        /// A hand point this near the slide's line is an inlier.
+        prismatic_tolerance_m: f64 = 0.02, "m", "B.1";
+        /// Least share of inliers of a slide, counted within the larger of the tolerance and twice the hand noise.
+        prismatic_min_inliers: f64 = 0.3, "-", "B.1";
+        /// Add the normal of the touched face to the Manhattan directions (furniture turned against the room).
+        use_face_normal: bool = true, "-", "ours";
+        /// Hinge directions within this angle of an axis of the face are set to it.
+        snap_deg: f64 = 12.0, "deg", "ours";
+        /// Merge clips of one joint into one scene-level joint.
+        merge_clips: bool = true, "-", "C.2";
+        /// Clips whose closed grips are nearer than this can be one joint.
+        merge_grip_m: f64 = 0.15, "m", "ours";
+        /// Clips whose axes differ by less than this can be one joint.
+        merge_angle_deg: f64 = 25.0, "deg", "ours";
+    }
+}
+
+block! {
+    /// Boxes, handles, carcass, limits (ours).
+    Fitting, "fitting", {
+        /// Cell of the grid on the front face in which the moving part is found.
+        cell_m: f64 = 0.02, "m", "ours";
+        /// Thickness of doors, fronts and boards.
+        board_m: f64 = 0.018, "m", "ours";
+        /// Free space between a moving part and whatever is fixed.
+        clearance_m: f64 = 0.003, "m", "ours";
+        /// Depth of a carcass where nothing tells it.
+        carcass_depth_m: f64 = 0.55, "m", "ours";
+        /// Density of boards.
+        density_kg_per_m3: f64 = 700.0, "kg/m^3", "ours";
+        /// Viscous damping of hinges.
+        hinge_damping: f64 = 0.5, "N m s/rad", "ours";
+        /// Dry friction of hinges.
+        hinge_friction: f64 = 0.2, "N m", "ours";
+        /// Viscous damping of slides.
+        slide_damping: f64 = 5.0, "N s/m", "ours";
+        /// Dry friction of slides.
+        slide_friction: f64 = 2.0, "N", "ours";
+    }
+}
+
+block! {
+    /// The hand in the simulation, and what counts as explained (ours).
+    Validation, "validation", {
+        /// Step of the simulation.
+        step_secs: f64 = 1.0 / 240.0, "s", "ours";
+        /// Stiffness of the hand's grip.
+        hand_stiffness_n_per_m: f64 = 800.0, "N/m", "ours";
+        /// The most a person's arm pulls.
+        hand_force_max_n: f64 = 150.0, "N", "ours";
+        /// Tracking error up to which a motion counts as explained: a right joint shows 2 to 5 cm of it under the errors
+        /// of estimated hands.
+        pass_rms_m: f64 = 0.05, "m", "ours";
+        /// Share of the observed range that the simulated joint must reach.
+        pass_range_share: f64 = 0.8, "-", "ours";
+        /// Rivals must be worse by this factor, or the recording cannot decide.
+        rival_margin: f64 = 1.15, "-", "ours";
+        /// Less opening than this cannot tell a hinge from a slide.
+        min_turn_deg: f64 = 15.0, "deg", "ours";
+        /// Less travel than this cannot tell a slide from a hinge.
+        min_travel_m: f64 = 0.08, "m", "ours";
+    }
+}
+
+/// The whole configuration. `Config::default()` is what `paws` runs without `--config`.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Seed of every random draw.
+    pub seed: u64,
+    /// §3.1, §A.2.
+    pub hands: Hands,
+    /// §3.1, §A.3.
+    pub localization: Localization,
+    /// §3.2, §A.4, §A.5.
+    pub geometry: Geometry,
+    /// §3.3, §A.6.
+    pub reasoning: Reasoning,
+    /// §3.4, §A.7, §C.2.
+    pub inference: Inference,
+    /// Ours.
+    pub fitting: Fitting,
+    /// Ours.
+    pub validation: Validation,
+}
+
+impl Config {
+    /// Reads a TOML file; keys that are absent keep their defaults, unknown keys and impossible values are errors.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+        let config: Self = toml::from_str(&text)
+            .map_err(|e| Error::Config(format!("{}: {}", path.display(), e.to_string().trim_end())))?;
+        config.check().map_err(|e| Error::Config(format!("{}: {e}", path.display())))?;
+        Ok(config)
+    }
+
+    /// All values with unit, source and meaning, in the order of the pipeline.
+    #[must_use]
+    pub fn rows(&self) -> Vec<Row> {
+        let mut rows = Vec::new();
+        self.hands.rows(&mut rows);
+        self.localization.rows(&mut rows);
+        self.geometry.rows(&mut rows);
+        self.reasoning.rows(&mut rows);
+        self.inference.rows(&mut rows);
+        self.fitting.rows(&mut rows);
+        self.validation.rows(&mut rows);
+        rows
+    }
+
+    /// The whole configuration as TOML with unit, section and meaning as comments; [`Config::read`] takes it back.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        let mut text = format!("# Seed of every random draw.\nseed = {}\n", self.seed);
+        let mut block = "";
+        let rows = self.rows();
+        for row in &rows {
+            let Some((name, key)) = row.key.split_once('.') else { continue };
+            if name != block {
+                block = name;
+                text += &format!("\n[{name}]\n");
+            }
+            let source = if row.section == "ours" { "ours".to_owned() } else { format!("paper, {}", row.section) };
+            text += &format!("# {} [{}; {source}]\n{key} = {}\n", row.meaning, row.unit, row.value);
+        }
+        text
+    }
+
+    /// Refuses values that no step could work with.
+    fn check(&self) -> std::result::Result<(), String> {
+        for row in self.rows() {
+            let Ok(value) = row.value.parse::<f64>() else { continue };
+            let zero_is_fine = ["hands.restart_after", "localization.min_visible_share"];
+            if !value.is_finite() || value < 0.0 || (value == 0.0 && !zero_is_fine.contains(&row.key.as_str())) {
+                return Err(format!("{} = {} must be a positive finite number ({})", row.key, row.value, row.unit));
+            }
+            let is_share = row.unit == "-" && row.value.contains('.') && row.key != "validation.rival_margin";
+            if is_share && value >= 1.0 {
+                return Err(format!("{} = {} must be below 1", row.key, row.value));
+            }
+        }
+        if self.inference.torus_tolerance_min_m > self.inference.torus_tolerance_max_m {
+            return Err("inference.torus_tolerance_min_m is above torus_tolerance_max_m".to_owned());
+        }
+        if self.localization.min_views > self.localization.local_frames {
+            return Err("localization.min_views is above local_frames: no voxel could ever be confident".to_owned());
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_printed_config_reads_back_as_itself() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("c.toml");
+        std::fs::write(&path, Config::default().to_toml()).unwrap();
+        assert_eq!(Config::read(&path).unwrap(), Config::default());
+    }
+
+    #[test]
+    fn every_hyperparameter_of_the_paper_has_its_value() {
+        let rows = Config::default().rows();
+        let value = |key: &str| rows.iter().find(|r| r.key == key).map(|r| r.value.clone()).unwrap();
+        for (key, expected) in [
+            ("hands.observation_std_m", "0.05"),
+            ("hands.gate_p_value", "0.05"),
+            ("localization.voxel_m", "0.05"),
+            ("localization.min_views", "4"),
+            ("localization.local_frames", "5"),
+            ("localization.global_views", "50"),
+            ("reasoning.candidates", "4"),
+            ("inference.torus_tolerance_ratio", "0.15"),
+            ("inference.torus_tolerance_min_m", "0.015"),
+            ("inference.torus_tolerance_max_m", "0.05"),
+            ("inference.max_radius_m", "1.0"),
+            ("inference.prismatic_tolerance_m", "0.02"),
+            ("inference.prismatic_min_inliers", "0.3"),
+        ] {
+            assert_eq!(value(key), expected, "{key}");
+        }
+    }
+
+    #[test]
+    fn impossible_values_are_named() {
+        let dir = tempfile::tempdir().unwrap();
+        for (text, word) in [
+            ("[hands]\nobservation_std_m = -1.0", "observation_std_m"),
+            ("[hands]\nobservation_std_m = nan", "observation_std_m"),
+            ("[hands]\nobservaton_std_m = 1.0", "observaton_std_m"),
+            ("[localization]\nmin_views = 9", "min_views"),
+            ("[hands", "c.toml"),
+        ] {
+            let path = dir.path().join("c.toml");
+            std::fs::write(&path, text).unwrap();
+            let error = Config::read(&path).unwrap_err().to_string();
+            assert!(error.contains(word), "{error}");
+        }
+    }
+}

@@ -1,0 +1,9 @@
+//! Predictions against truth under named rules, because "MAO" alone is not one number.
+
+pub mod rules;
+pub mod summary;
+pub mod truth;
+
+pub use rules::{Measured, Rule};
+pub use summary::{Report, evaluate};
+pub use truth::{Prediction, Predictions, Truth};

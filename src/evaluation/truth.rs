@@ -1,0 +1,173 @@
+//! `predictions.json` and `ground_truth.json`.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::articulation::JointKind;
+use crate::error::{Error, Result};
+use crate::math::{Point, Vector, unit};
+use crate::recording::json;
+use crate::twin::OrientedBox;
+
+/// All predictions of a file.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Predictions {
+    /// One row a clip; a clip left out or of type null is a missed detection.
+    pub predictions: Vec<Prediction>,
+}
+
+/// The prediction for one clip.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Prediction {
+    /// Name of the recording.
+    pub recording: String,
+    /// Name of the clip.
+    pub clip: String,
+    /// Motion type; null = no answer.
+    #[serde(rename = "type")]
+    pub kind: Option<JointKind>,
+    /// Unit axis, world; positive opens.
+    #[serde(default)]
+    pub axis: Option<Vector>,
+    /// Point on the hinge nearest to the middle of the part.
+    #[serde(default)]
+    pub origin: Option<Point>,
+    /// The paper's origin: the hand centroid's projection on the hinge (§A.7).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contact_pivot: Option<Point>,
+    /// Opening that the clip went through, rad or m.
+    #[serde(default)]
+    pub range: Option<f64>,
+    /// Box of the moving part, closed.
+    #[serde(default)]
+    pub part_box: Option<OrientedBox>,
+    /// Probability that the answer's type is right.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub confidence: Option<f64>,
+    /// Which joint of the scene.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint: Option<String>,
+    /// Why there is no answer.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+}
+
+impl Predictions {
+    /// Reads a file and checks its rows.
+    pub fn read(path: &Path) -> Result<Self> {
+        let mut all: Self = json(path)?;
+        for (i, p) in all.predictions.iter_mut().enumerate() {
+            let place = format!("predictions[{i}] ({}/{})", p.recording, p.clip);
+            if p.kind.is_none() {
+                continue;
+            }
+            let axis = p.axis.and_then(|a| unit(&a)).ok_or_else(|| {
+                Error::format(path, place.clone(), "a prediction with a type needs a finite axis that is not zero")
+            })?;
+            p.axis = Some(axis);
+            if p.origin.is_some_and(|o| o.coords.iter().any(|x| !x.is_finite())) {
+                return Err(Error::format(path, place, "the origin is not finite"));
+            }
+        }
+        Ok(all)
+    }
+}
+
+/// The truth of one recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Truth {
+    /// Name of the recording.
+    pub recording: String,
+    /// Every narrated clip; `None` where it moves no joint.
+    pub clips: BTreeMap<String, Option<TrueClip>>,
+}
+
+/// What a clip really shows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrueClip {
+    /// Id of the joint.
+    pub joint: String,
+    /// Motion type.
+    pub kind: JointKind,
+    /// Unit axis; positive opens.
+    pub axis: Vector,
+    /// Projection of the closed part's box centre on the hinge; for a slide the box centre.
+    pub origin: Point,
+    /// Projection of the closed handle on the hinge.
+    pub origin_handle: Point,
+    /// Opening that the clip went through, rad or m.
+    pub moved: f64,
+    /// Box of the moving part, closed.
+    pub part_box: OrientedBox,
+}
+
+#[derive(Deserialize)]
+struct TruthFile {
+    joints: Vec<TrueJoint>,
+    clips: Vec<TruthClip>,
+}
+
+#[derive(Deserialize)]
+struct TrueJoint {
+    id: String,
+    #[serde(rename = "type")]
+    kind: JointKind,
+    axis: Vector,
+    origin: Point,
+    origin_handle: Point,
+    part_box: OrientedBox,
+}
+
+#[derive(Deserialize)]
+struct TruthClip {
+    clip: String,
+    joint: String,
+    x: Vec<f64>,
+}
+
+#[derive(Deserialize)]
+struct ClipNames {
+    clips: Vec<crate::recording::Clip>,
+}
+
+impl Truth {
+    /// Reads a recording's folder (`ground_truth.json` beside `clips.json`), or such a file.
+    pub fn read(path: &Path) -> Result<Self> {
+        let (dir, file) = if path.is_dir() {
+            (path.to_owned(), path.join("ground_truth.json"))
+        } else {
+            (path.parent().unwrap_or(Path::new(".")).to_owned(), path.to_owned())
+        };
+        let truth: TruthFile = json(&file)?;
+        let names: ClipNames = json(&dir.join("clips.json"))?;
+        let recording = dir
+            .canonicalize()
+            .ok()
+            .and_then(|d| d.file_name().map(|n| n.to_string_lossy().into_owned()))
+            .ok_or_else(|| Error::format(&file, "folder", "has no name"))?;
+        let mut clips: BTreeMap<String, Option<TrueClip>> = names.clips.into_iter().map(|c| (c.clip, None)).collect();
+        for clip in truth.clips {
+            let place = format!("clip {}", clip.clip);
+            let joint =
+                truth.joints.iter().find(|j| j.id == clip.joint).ok_or_else(|| {
+                    Error::format(&file, place.clone(), format!("joint {} is not in joints", clip.joint))
+                })?;
+            let axis = unit(&joint.axis).ok_or_else(|| Error::format(&file, place.clone(), "the axis is zero"))?;
+            let low = clip.x.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = clip.x.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let entry = TrueClip {
+                joint: joint.id.clone(),
+                kind: joint.kind,
+                axis,
+                origin: joint.origin,
+                origin_handle: joint.origin_handle,
+                moved: if high >= low { high - low } else { 0.0 },
+                part_box: joint.part_box,
+            };
+            clips.insert(clip.clip, Some(entry));
+        }
+        Ok(Self { recording, clips })
+    }
+}

@@ -1,0 +1,335 @@
+//! From joints to boxes: the moving part around what was seen to move, its handle, the furniture behind it (ours).
+
+pub mod overlap;
+
+use nalgebra::Matrix3;
+
+use crate::articulation::{Articulation, JointKind};
+use crate::config;
+use crate::geometry::Face;
+use crate::geometry::moved::Rect;
+use crate::math::{Point, Vector, any_orthogonal, unit, unsigned_angle};
+use crate::pipeline::{Scene, SceneJoint};
+use crate::twin::{Furniture, Joint, OrientedBox, Part, Role, Solid, Twin};
+
+/// Height of a handle's bar over its face, metres; and half the width of bar and posts.
+const HANDLE_STANDOFF_M: f64 = 0.035;
+const HANDLE_HALF_M: f64 = 0.006;
+/// Half-length of a handle's bar.
+const HANDLE_BAR_HALF_M: f64 = 0.06;
+
+/// A joint with its face and the rectangle of its part, ready to be built.
+#[derive(Debug, Clone)]
+struct Plan<'a> {
+    joint: &'a SceneJoint,
+    articulation: Articulation,
+    face: Face,
+    rect: Rect,
+    seen: bool,
+}
+
+/// Builds the twin of a scene.
+#[must_use]
+pub fn fit(scene: &Scene, up: &Vector, config: &config::Fitting) -> Twin {
+    let mut plans: Vec<Plan> = scene.joints.iter().map(|j| plan(j, up, config)).collect();
+    let mut rects: Vec<(Face, Rect)> = plans.iter().map(|p| (p.face, p.rect)).collect();
+    overlap::separate(&mut rects, config);
+    for (plan, (_, rect)) in plans.iter_mut().zip(rects) {
+        plan.rect = rect;
+    }
+    let mut furniture: Vec<Furniture> = plans.iter().map(|p| build(p, config.carcass_depth_m, config)).collect();
+    // Carcasses behind faces that meet at a corner share space: the later one gets shallower until it does not.
+    for i in 1..furniture.len() {
+        let mut depth = config.carcass_depth_m;
+        while overlap::any(&furniture[..i], &furniture[i]) && depth > 0.1 {
+            depth -= 0.05;
+            furniture[i] = build(&plans[i], depth, config);
+        }
+    }
+    Twin { name: scene.recording.clone(), density_kg_per_m3: config.density_kg_per_m3, furniture }
+}
+
+/// Face, rectangle and the joint moved onto them.
+fn plan<'a>(joint: &'a SceneJoint, up: &Vector, config: &config::Fitting) -> Plan<'a> {
+    let face = joint.face.unwrap_or_else(|| assumed_face(joint, up));
+    let (rect, seen) = rectangle(joint, &face);
+    let mut articulation = joint.joint;
+    if articulation.kind == JointKind::Revolute {
+        // The hinge runs through the leaf: at its front edge, or within its thickness.
+        let [r, u, h] = face.coordinates(&articulation.origin);
+        articulation.origin = face.point(r, u, h.clamp(-config.board_m, 0.0));
+        for axis in [face.up, face.right] {
+            if unsigned_angle(&axis, &articulation.axis) < 12f64.to_radians() {
+                articulation.axis = if axis.dot(&articulation.axis) < 0.0 { -axis } else { axis };
+            }
+        }
+    }
+    Plan { joint, articulation, face, rect, seen }
+}
+
+/// Without a face in the images the motion of the grip tells which way the front looks.
+fn assumed_face(joint: &SceneJoint, up: &Vector) -> Face {
+    let normal = match joint.joint.kind {
+        JointKind::Prismatic => joint.joint.axis,
+        JointKind::Revolute => unit(&joint.joint.axis.cross(&(joint.grip - joint.joint.origin)))
+            .unwrap_or_else(|| any_orthogonal(&joint.joint.axis)),
+    };
+    let face_up = unit(&crate::math::reject(up, &normal)).unwrap_or_else(|| any_orthogonal(&normal));
+    Face {
+        center: joint.grip - normal * HANDLE_STANDOFF_M,
+        right: face_up.cross(&normal),
+        up: face_up,
+        normal,
+        extent: [[-0.3, 0.3]; 2],
+        support: 0.0,
+    }
+}
+
+/// The part's rectangle: what was seen to move, brought to the hinge; else what the grip and the hinge suggest.
+fn rectangle(joint: &SceneJoint, face: &Face) -> (Rect, bool) {
+    // Handles stand a few centimetres from the free edge.
+    const RIM_M: f64 = 0.05;
+    const MIN_M: f64 = 0.1;
+    let seen = joint.part.is_some();
+    let mut bounds = joint.part.map_or_else(
+        || {
+            let [r, u] = face.extent;
+            // The extent may be a whole row of furniture: a part is no wider than 0.6 m and no taller than the row.
+            [[r[0].max(-0.3), r[1].min(0.3)], [u[0].max(-0.35), u[1].min(0.35)]]
+        },
+        |r| r.bounds,
+    );
+    if joint.joint.kind == JointKind::Revolute {
+        let [r, u, _] = face.coordinates(&joint.joint.origin);
+        let upright = joint.joint.axis.dot(&face.up).abs() >= joint.joint.axis.dot(&face.right).abs();
+        let (axis, at) = if upright { (0, r) } else { (1, u) };
+        // The hinge is one edge of the leaf, the grip is near the other.
+        if at < 0.0 {
+            bounds[axis] = [at, if seen { bounds[axis][1].max(at + MIN_M) } else { RIM_M }];
+        } else {
+            bounds[axis] = [if seen { bounds[axis][0].min(at - MIN_M) } else { -RIM_M }, at];
+        }
+    }
+    for b in &mut bounds {
+        // The handle is on the part.
+        b[0] = b[0].min(-0.02);
+        b[1] = b[1].max(0.02);
+        if b[1] - b[0] < MIN_M {
+            let middle = 0.5 * (b[0] + b[1]);
+            *b = [middle - 0.5 * MIN_M, middle + 0.5 * MIN_M];
+        }
+    }
+    (Rect { bounds }, seen)
+}
+
+/// A box in face coordinates: `[right, up, out][min, max]`.
+fn face_box(face: &Face, bounds: [[f64; 2]; 3]) -> OrientedBox {
+    let middle = bounds.map(|b| 0.5 * (b[0] + b[1]));
+    OrientedBox {
+        center: face.point(middle[0], middle[1], middle[2]),
+        half: Vector::from_iterator(bounds.iter().map(|b| 0.5 * (b[1] - b[0]))),
+        rotation: Matrix3::from_columns(&[face.right, face.up, face.normal]),
+    }
+}
+
+fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
+    let face = &plan.face;
+    let id = &plan.joint.id;
+    let gap = config.clearance_m;
+    let board = config.board_m;
+    let [r, u] = plan.rect.bounds;
+    let inset = 0.5 * gap;
+    let (front_r, front_u) = ([r[0] + inset, r[1] - inset], [u[0] + inset, u[1] - inset]);
+    let solid = |name: &str, role: Role, bounds: [[f64; 2]; 3], seen: bool| Solid {
+        name: format!("{id}_{name}"),
+        role,
+        shape: face_box(face, bounds),
+        seen,
+    };
+    let mut solids = vec![solid("front", Role::Front, [front_r, front_u, [-board, 0.0]], plan.seen)];
+    solids.extend(handle(plan, front_r, front_u, &solid));
+
+    let carcass_out = [-depth, -board - gap];
+    let slide = plan.articulation.kind == JointKind::Prismatic;
+    let mut upper = plan.joint.observed_range;
+    if slide {
+        let tray = [-(depth - board - 2.0 * gap), -board];
+        let inner_r = [r[0] + board + 2.0 * gap, r[1] - board - 2.0 * gap];
+        // A tray's walls are lower than its front.
+        let inner_u =
+            [u[0] + board + 2.0 * gap, u[0] + board + 2.0 * gap + 0.7 * (u[1] - u[0] - 2.0 * board - 4.0 * gap)];
+        if inner_r[1] - inner_r[0] > 4.0 * board && inner_u[1] - inner_u[0] > 2.0 * board {
+            let thin = 0.012;
+            solids.push(solid("tray_left", Role::Tray, [[inner_r[0], inner_r[0] + thin], inner_u, tray], false));
+            solids.push(solid("tray_right", Role::Tray, [[inner_r[1] - thin, inner_r[1]], inner_u, tray], false));
+            let between = [inner_r[0] + thin, inner_r[1] - thin];
+            solids.push(solid("tray_bottom", Role::Tray, [between, [inner_u[0], inner_u[0] + thin], tray], false));
+            let above = [inner_u[0] + thin, inner_u[1]];
+            solids.push(solid("tray_back", Role::Tray, [between, above, [tray[0], tray[0] + thin]], false));
+        }
+        upper = upper.min(tray[1] - tray[0]);
+    }
+    let deep = carcass_out[0];
+    let between_r = [r[0] + board, r[1] - board];
+    let between_u = [u[0] + board, u[1] - board];
+    let mut carcass = vec![
+        solid("carcass_left", Role::Carcass, [[r[0], r[0] + board], u, carcass_out], false),
+        solid("carcass_right", Role::Carcass, [[r[1] - board, r[1]], u, carcass_out], false),
+        solid("carcass_bottom", Role::Carcass, [between_r, [u[0], u[0] + board], carcass_out], false),
+        solid("carcass_top", Role::Carcass, [between_r, [u[1] - board, u[1]], carcass_out], false),
+        solid("carcass_back", Role::Carcass, [between_r, between_u, [deep, deep + board]], false),
+    ];
+    carcass.retain(|s| s.shape.half.iter().all(|h| *h > 1e-3));
+
+    let (damping, friction) = if slide {
+        (config.slide_damping, config.slide_friction)
+    } else {
+        (config.hinge_damping, config.hinge_friction)
+    };
+    let least = if slide { 0.01 } else { 0.02 };
+    let bounds = bounds_of(&solids, face);
+    let mut articulation = plan.articulation;
+    articulation.origin = match articulation.kind {
+        JointKind::Revolute => articulation.line().project(&bounds.center),
+        JointKind::Prismatic => bounds.center,
+    };
+    let handle = solids.iter().find(|s| s.role == Role::Handle).map_or(plan.joint.grip, |s| s.shape.center);
+    let word = plan.joint.furniture.as_deref().unwrap_or(articulation.kind.word());
+    Furniture {
+        name: format!("{id}_base"),
+        carcass,
+        part: Part {
+            id: id.clone(),
+            label: word.to_owned(),
+            joint: Joint {
+                articulation,
+                upper: upper.clamp(least, std::f64::consts::PI),
+                observed: plan.joint.observed_range,
+                damping,
+                friction,
+            },
+            solids,
+            handle,
+            bounds,
+        },
+    }
+}
+
+/// A bar on two posts where the hand was; upright beside an upright hinge, level otherwise.
+fn handle(
+    plan: &Plan,
+    front_r: [f64; 2],
+    front_u: [f64; 2],
+    solid: &impl Fn(&str, Role, [[f64; 2]; 3], bool) -> Solid,
+) -> Vec<Solid> {
+    let upright = plan.articulation.kind == JointKind::Revolute
+        && plan.articulation.axis.dot(&plan.face.up).abs() > plan.articulation.axis.dot(&plan.face.right).abs();
+    let along = usize::from(upright);
+    let bounds = [front_r, front_u];
+    let half: [f64; 2] = std::array::from_fn(|i| {
+        let wanted = if i == along { HANDLE_BAR_HALF_M } else { HANDLE_HALF_M };
+        wanted.min(0.4 * (bounds[i][1] - bounds[i][0]))
+    });
+    // The grip is the face's origin; the whole bar stays on the front.
+    let center: [f64; 2] = std::array::from_fn(|i| {
+        let [low, high] = [bounds[i][0] + half[i], bounds[i][1] - half[i]];
+        if low <= high { 0f64.clamp(low, high) } else { 0.5 * (low + high) }
+    });
+    let span = |i: usize| [center[i] - half[i], center[i] + half[i]];
+    let bar_out = [HANDLE_STANDOFF_M - HANDLE_HALF_M, HANDLE_STANDOFF_M + HANDLE_HALF_M];
+    let mut solids = vec![solid("handle_bar", Role::Handle, [span(0), span(1), bar_out], true)];
+    for (name, end) in [("handle_post_a", -1.0), ("handle_post_b", 1.0)] {
+        let mut post = [span(0), span(1), [0.0, bar_out[0]]];
+        let at = center[along] + end * (half[along] - HANDLE_HALF_M);
+        post[along] = [at - HANDLE_HALF_M, at + HANDLE_HALF_M];
+        solids.push(solid(name, Role::Handle, post, false));
+    }
+    solids
+}
+
+/// The box around solids in the axes of a face.
+fn bounds_of(solids: &[Solid], face: &Face) -> OrientedBox {
+    let mut bounds = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
+    for corner in solids.iter().flat_map(|s| s.shape.corners()) {
+        for (b, c) in bounds.iter_mut().zip(face.coordinates(&corner)) {
+            b[0] = b[0].min(c);
+            b[1] = b[1].max(c);
+        }
+    }
+    face_box(face, bounds)
+}
+
+/// Where the grip is on a part: its handle's bar.
+#[must_use]
+pub fn handle_point(part: &Part) -> Point {
+    part.handle
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene_joint(kind: JointKind) -> SceneJoint {
+        let face = Face {
+            center: Point::new(0.2, 0.0, 0.8),
+            right: Vector::x(),
+            up: Vector::z(),
+            normal: -Vector::y(),
+            extent: [[-0.5, 0.5], [-0.5, 0.5]],
+            support: 1.0,
+        };
+        let joint = match kind {
+            JointKind::Revolute => Articulation { kind, axis: -Vector::z(), origin: Point::new(-0.35, 0.01, 0.5) },
+            JointKind::Prismatic => Articulation { kind, axis: -Vector::y(), origin: Point::new(0.2, 0.0, 0.8) },
+        };
+        SceneJoint {
+            id: "joint_0".to_owned(),
+            joint,
+            clips: vec![],
+            furniture: None,
+            type_probability: 1.0,
+            grip: Point::new(0.2, -0.035, 0.8),
+            face: Some(face),
+            part: Some(Rect { bounds: [[-0.5, 0.06], [-0.3, 0.1]] }),
+            observed_range: 0.4,
+        }
+    }
+
+    fn twin(joints: Vec<SceneJoint>) -> Twin {
+        let scene = Scene { recording: "r".to_owned(), manhattan: None, clips: vec![], joints };
+        fit(&scene, &Vector::z(), &config::Fitting::default())
+    }
+
+    #[test]
+    fn a_door_hangs_on_its_hinge_and_its_handle_is_where_the_hand_was() {
+        let twin = twin(vec![scene_joint(JointKind::Revolute)]);
+        let part = &twin.furniture[0].part;
+        let front = &part.solids[0].shape;
+        assert!((front.center.x - 0.5 * front.half.x * 0.0 - (-0.35 + 0.26) / 2.0).abs() < 1e-9, "{front:?}");
+        assert!((part.handle - Point::new(0.2, -0.035, 0.8)).norm() < 1e-9);
+        // The opened handle comes towards the person.
+        assert!((part.joint.articulation.motion(0.5) * part.handle).y < -0.2);
+    }
+
+    #[test]
+    fn parts_and_boards_do_not_touch_when_closed_nor_on_the_way() {
+        let mut neighbour = scene_joint(JointKind::Prismatic);
+        neighbour.id = "joint_1".to_owned();
+        for b in neighbour.part.iter_mut().flat_map(|r| &mut r.bounds[0]) {
+            *b += 0.55;
+        }
+        let twin = twin(vec![scene_joint(JointKind::Revolute), neighbour, scene_joint(JointKind::Prismatic)]);
+        for furniture in &twin.furniture[..2] {
+            for step in 0..=20 {
+                let motion =
+                    furniture.part.joint.articulation.motion(furniture.part.joint.upper * f64::from(step) / 20.0);
+                for moving in &furniture.part.solids {
+                    for board in &furniture.carcass {
+                        let moved = moving.shape.moved(&motion);
+                        assert!(!overlap::boxes(&moved, &board.shape), "{} {} {step}", moving.name, board.name);
+                    }
+                }
+            }
+        }
+    }
+}

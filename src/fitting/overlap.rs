@@ -1,0 +1,93 @@
+//! Boxes that must not share space.
+
+use parry3d::math::Pose as ParryPose;
+use parry3d::query;
+use parry3d::shape::Cuboid;
+
+use crate::config;
+use crate::geometry::Face;
+use crate::geometry::moved::Rect;
+use crate::twin::{Furniture, OrientedBox};
+
+/// Overlap below this is contact, not shared space, metres.
+const CONTACT_M: f64 = 1e-4;
+
+/// Whether two boxes share space.
+#[must_use]
+pub fn boxes(a: &OrientedBox, b: &OrientedBox) -> bool {
+    let shrunk = |o: &OrientedBox| {
+        let h = o.half.map(|h| (h - 0.5 * CONTACT_M).max(1e-6)).cast::<f32>();
+        Cuboid::new(h.into())
+    };
+    let pose = |o: &OrientedBox| -> ParryPose { o.pose().cast::<f32>().into() };
+    query::intersection_test(&pose(a), &shrunk(a), &pose(b), &shrunk(b)).is_ok_and(|hit| hit.intersecting)
+}
+
+/// Whether a piece of furniture shares space with any of the others, closed.
+#[must_use]
+pub fn any(others: &[Furniture], one: &Furniture) -> bool {
+    let solids =
+        |f: &Furniture| -> Vec<OrientedBox> { f.carcass.iter().chain(&f.part.solids).map(|s| s.shape).collect() };
+    let mine = solids(one);
+    others.iter().any(|f| solids(f).iter().any(|a| mine.iter().any(|b| boxes(a, b))))
+}
+
+/// Cuts rectangles of one plane that overlap at the middle of the overlap, across its narrower direction.
+pub fn separate(rects: &mut [(Face, Rect)], config: &config::Fitting) {
+    // Faces of one front: parallel within 10 degrees and within a few boards of one plane.
+    let plane_m = 3.0 * config.board_m;
+    for i in 0..rects.len() {
+        for j in 0..i {
+            let (a, b) = (rects[i], rects[j]);
+            let parallel = a.0.normal.dot(&b.0.normal) > 10f64.to_radians().cos();
+            let [dr, du, dn] = a.0.coordinates(&b.0.center);
+            if !parallel || dn.abs() > plane_m {
+                continue;
+            }
+            // The other rectangle in this one's coordinates; both are upright, so only the offset matters.
+            let other = [b.1.bounds[0].map(|x| x + dr), b.1.bounds[1].map(|x| x + du)];
+            let overlap = [0, 1].map(|k| (a.1.bounds[k][1].min(other[k][1])) - (a.1.bounds[k][0].max(other[k][0])));
+            if overlap.iter().any(|o| *o <= 0.0) {
+                continue;
+            }
+            let k = usize::from(overlap[1] < overlap[0]);
+            let shift = if k == 0 { dr } else { du };
+            let mine_is_lower = a.1.bounds[k][0] + a.1.bounds[k][1] < other[k][0] + other[k][1];
+            if mine_is_lower {
+                let cut = 0.5 * (a.1.bounds[k][1] + other[k][0]);
+                rects[i].1.bounds[k][1] = cut;
+                rects[j].1.bounds[k][0] = cut - shift;
+            } else {
+                let cut = 0.5 * (a.1.bounds[k][0] + other[k][1]);
+                rects[i].1.bounds[k][0] = cut;
+                rects[j].1.bounds[k][1] = cut - shift;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Point, Vector};
+
+    #[test]
+    fn neighbours_share_their_edge() {
+        let face = |x: f64| Face {
+            center: Point::new(x, 0.0, 0.0),
+            right: Vector::x(),
+            up: Vector::z(),
+            normal: -Vector::y(),
+            extent: [[0.0; 2]; 2],
+            support: 1.0,
+        };
+        let mut rects = [
+            (face(0.0), Rect { bounds: [[-0.3, 0.3], [-0.2, 0.2]] }),
+            (face(0.5), Rect { bounds: [[-0.24, 0.3], [-0.2, 0.2]] }),
+        ];
+        separate(&mut rects, &config::Fitting::default());
+        assert!((rects[0].1.bounds[0][1] - 0.28).abs() < 1e-12);
+        assert!((rects[1].1.bounds[0][0] + 0.22).abs() < 1e-12);
+        assert_eq!(rects[0].1.bounds[1], [-0.2, 0.2]);
+    }
+}

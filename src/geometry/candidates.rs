@@ -1,0 +1,247 @@
+//! All axes that the touched part could have: lines, edges of the moving part, arcs of the hand, directions (§3.2).
+
+use nalgebra::Point2;
+use serde::{Deserialize, Serialize};
+
+use super::moved::Rect;
+use super::{Face, LineTrack, ManhattanFrame};
+use crate::articulation::{Articulation, JointKind};
+use crate::config;
+use crate::math::{Point, Vector, circle, unsigned_angle};
+
+/// Where a candidate axis comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AxisSource {
+    /// A 3D line seen in several views.
+    Line,
+    /// An edge of the part that was seen to move.
+    PartEdge,
+    /// An edge of the visible face, which may belong to the whole piece of furniture.
+    FaceEdge,
+    /// The circle that the hand drew.
+    HandArc,
+    /// The normal of the touched face.
+    FaceNormal,
+    /// An axis of the touched face, in the face.
+    FaceAxis,
+    /// A direction of the room.
+    Manhattan,
+    /// The principal direction of the hand's path.
+    HandPath,
+}
+
+/// Which edge of the face a hinge lies at, seen by the person.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum HingeSide {
+    /// Left edge, upright axis.
+    Left,
+    /// Right edge, upright axis.
+    Right,
+    /// Upper edge, level axis.
+    Top,
+    /// Lower edge, level axis.
+    Bottom,
+}
+
+/// One axis that the part could move about or along.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AxisCandidate {
+    /// Type, axis and a point on it; the axis' sense opens outward where the face tells.
+    pub joint: Articulation,
+    /// Where it comes from.
+    pub source: AxisSource,
+    /// Edge of the face, for hinges in a face.
+    pub side: Option<HingeSide>,
+    /// Views that saw the line, for lines.
+    pub views: usize,
+    /// Length of the line, for lines and edges, metres.
+    pub length_m: f64,
+}
+
+/// What the candidates are made from.
+#[derive(Debug, Clone, Copy)]
+pub struct Evidence<'a> {
+    /// The touched face.
+    pub face: Option<&'a Face>,
+    /// The part of it that moved.
+    pub rect: Option<&'a Rect>,
+    /// 3D lines at the region.
+    pub tracks: &'a [LineTrack],
+    /// The room's frame.
+    pub manhattan: Option<&'a ManhattanFrame>,
+    /// The grip at the closed end.
+    pub grip: Point,
+    /// The hand's smoothed path.
+    pub path: &'a [Point],
+}
+
+/// Collects all candidates, hinges first.
+#[must_use]
+pub fn collect(evidence: &Evidence, config: &config::Inference) -> Vec<AxisCandidate> {
+    let mut out = Vec::new();
+    hinges(evidence, config, &mut out);
+    slides(evidence, config, &mut out);
+    for candidate in &mut out {
+        if let Some(face) = evidence.face {
+            candidate.joint = outward(candidate.joint, face, &evidence.grip);
+        }
+    }
+    out
+}
+
+/// Gives the axis the sense that moves the grip out of the face; a slide within the face keeps its sense.
+#[must_use]
+pub fn outward(joint: Articulation, face: &Face, grip: &Point) -> Articulation {
+    let out = match joint.kind {
+        JointKind::Revolute => joint.axis.cross(&(grip - joint.origin)).normalize().dot(&face.normal),
+        JointKind::Prismatic => joint.axis.dot(&face.normal),
+    };
+    // Within 17 degrees of the face the sign of the normal component is noise.
+    if out < -0.3 { joint.reversed() } else { joint }
+}
+
+fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCandidate>) {
+    let snap = config.snap_deg.to_radians();
+    if let Some(face) = evidence.face {
+        for track in evidence.tracks {
+            let Some((direction, upright)) = snapped(face, &track.segment.line.direction, snap) else { continue };
+            let [right, up, height] = face.coordinates(&track.segment.middle());
+            // A hinge lies at its face: deeper or nearer lines are the carcass, the floor, other furniture.
+            if height.abs() > 0.08 {
+                continue;
+            }
+            out.push(AxisCandidate {
+                joint: Articulation { kind: JointKind::Revolute, axis: direction, origin: track.segment.middle() },
+                source: AxisSource::Line,
+                side: Some(side_of(if upright { right } else { up }, upright)),
+                views: track.views.len(),
+                length_m: track.segment.length(),
+            });
+        }
+        let edges = [
+            (evidence.rect.copied(), AxisSource::PartEdge),
+            (Some(Rect { bounds: face.extent }), AxisSource::FaceEdge),
+        ];
+        for (rect, source) in edges {
+            let Some(rect) = rect else { continue };
+            let middle = rect.bounds.map(|b| 0.5 * (b[0] + b[1]));
+            let size = rect.size();
+            let upright = rect.bounds[0].map(|r| (face.up, face.point(r, middle[1], 0.0), side_of(r, true), size[1]));
+            let level = rect.bounds[1].map(|u| (face.right, face.point(middle[0], u, 0.0), side_of(u, false), size[0]));
+            out.extend(upright.into_iter().chain(level).map(|(axis, origin, side, length_m)| AxisCandidate {
+                joint: Articulation { kind: JointKind::Revolute, axis, origin },
+                source,
+                side: Some(side),
+                views: 0,
+                length_m,
+            }));
+        }
+    } else {
+        for track in evidence.tracks {
+            let joint = Articulation {
+                kind: JointKind::Revolute,
+                axis: track.segment.line.direction,
+                origin: track.segment.middle(),
+            };
+            out.push(AxisCandidate {
+                joint,
+                source: AxisSource::Line,
+                side: None,
+                views: track.views.len(),
+                length_m: track.segment.length(),
+            });
+        }
+    }
+    let directions: Vec<Vector> = match evidence.face {
+        Some(face) => vec![face.up, face.right],
+        None => evidence.manhattan.map_or_else(Vec::new, |m| m.axes.to_vec()),
+    };
+    for direction in directions {
+        if let Some(joint) = arc_about(evidence.path, &direction) {
+            let side = evidence.face.map(|face| {
+                let [right, up, _] = face.coordinates(&joint.origin);
+                if unsigned_angle(&direction, &face.up) < 0.1 { side_of(right, true) } else { side_of(up, false) }
+            });
+            out.push(AxisCandidate { joint, source: AxisSource::HandArc, side, views: 0, length_m: 0.0 });
+        }
+    }
+}
+
+fn side_of(offset: f64, upright: bool) -> HingeSide {
+    match (upright, offset < 0.0) {
+        (true, true) => HingeSide::Left,
+        (true, false) => HingeSide::Right,
+        (false, true) => HingeSide::Bottom,
+        (false, false) => HingeSide::Top,
+    }
+}
+
+/// The face's up or right axis if the direction is near one, and whether it is the upright one.
+fn snapped(face: &Face, direction: &Vector, tolerance: f64) -> Option<(Vector, bool)> {
+    if unsigned_angle(direction, &face.up) <= tolerance {
+        Some((face.up, true))
+    } else if unsigned_angle(direction, &face.right) <= tolerance {
+        Some((face.right, false))
+    } else {
+        None
+    }
+}
+
+fn slides(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCandidate>) {
+    let origin = evidence.path.first().copied().unwrap_or(evidence.grip);
+    let mut push = |axis: Vector, source: AxisSource| {
+        let joint = Articulation { kind: JointKind::Prismatic, axis, origin };
+        out.push(AxisCandidate { joint, source, side: None, views: 0, length_m: 0.0 });
+    };
+    if let Some(face) = evidence.face.filter(|_| config.use_face_normal) {
+        push(face.normal, AxisSource::FaceNormal);
+        push(face.right, AxisSource::FaceAxis);
+        push(face.up, AxisSource::FaceAxis);
+    }
+    for axis in evidence.manhattan.iter().flat_map(|m| m.axes) {
+        push(axis, AxisSource::Manhattan);
+    }
+    if evidence.face.is_none()
+        && evidence.manhattan.is_none()
+        && let (Some(first), Some(last)) = (evidence.path.first(), evidence.path.last())
+        && let Some(axis) = crate::math::unit(&(last - first))
+    {
+        push(axis, AxisSource::HandPath);
+    }
+}
+
+/// The circle about a fixed direction that the path draws; `None` where it bends too little to have one.
+#[must_use]
+pub fn arc_about(path: &[Point], direction: &Vector) -> Option<Articulation> {
+    let e1 = crate::math::any_orthogonal(direction);
+    let e2 = direction.cross(&e1);
+    let mean = crate::math::centroid(path)?;
+    let flat: Vec<Point2<f64>> = path.iter().map(|p| Point2::new((p - mean).dot(&e1), (p - mean).dot(&e2))).collect();
+    let circle = circle::fit(&flat)?;
+    let origin = mean + e1 * circle.center.x + e2 * circle.center.y;
+    // The sense in which the path turns.
+    let (first, last) = (path.first()? - origin, path.last()? - origin);
+    let turn = direction.dot(&first.cross(&last));
+    let axis = if turn < 0.0 { -*direction } else { *direction };
+    Some(Articulation { kind: JointKind::Revolute, axis, origin })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_arc_of_a_door_is_its_hinge() {
+        let path: Vec<Point> = (0..30)
+            .map(|i| {
+                let a = f64::from(i) * 0.03;
+                Point::new(2.0 + 0.5 * a.cos(), 1.0 + 0.5 * a.sin(), 1.1)
+            })
+            .collect();
+        let joint = arc_about(&path, &Vector::z()).unwrap();
+        assert!((joint.origin - Point::new(2.0, 1.0, 1.1)).norm() < 1e-6);
+        assert!(joint.axis.z > 0.99);
+    }
+}

@@ -1,0 +1,158 @@
+//! The Manhattan frame of a scene from surface normals (§A.5).
+
+use nalgebra::{Matrix3, Rotation3};
+use serde::{Deserialize, Serialize};
+
+use crate::config;
+use crate::error::Result;
+use crate::math::directions::{kmeans, mean_shift};
+use crate::math::{Point, Vector, unit};
+use crate::recording::{Grid, HAND_CLASS, Recording};
+
+/// Three orthogonal directions of the room.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ManhattanFrame {
+    /// `m_1, m_2, m_3`, world, orthonormal and right-handed, the most upward one last.
+    pub axes: [Vector; 3],
+    /// Frames whose normals agreed on it.
+    pub frames: usize,
+}
+
+/// Estimates the frame from the normals of the given views; `None` where no view shows three directions.
+pub fn estimate(recording: &Recording, views: &[usize], config: &config::Geometry) -> Result<Option<ManhattanFrame>> {
+    let mut axes: Vec<(Vector, f64)> = Vec::new();
+    let mut frames = 0;
+    for &view in views {
+        let normals = view_normals(recording, view, config)?;
+        let Some(triple) = frame_triple(&normals, config.normal_clusters) else { continue };
+        let rotation = recording.frames[view].world_from_camera.rotation;
+        axes.extend(triple.map(|(axis, weight)| (rotation * axis, weight)));
+        frames += 1;
+    }
+    Ok(combine(&axes, &recording.up(), config.mean_shift_deg.to_radians()).map(|axes| ManhattanFrame { axes, frames }))
+}
+
+/// Camera-frame normals of a view: from its normals file, else from the slope of its depth.
+pub fn view_normals(recording: &Recording, view: usize, config: &config::Geometry) -> Result<Vec<Vector>> {
+    let camera = &recording.camera;
+    let mask = recording.mask(view)?;
+    let total = camera.width * camera.height;
+    let step = ((total as f64 / config.normals_per_frame as f64).sqrt().floor() as usize).max(1);
+    let is_hand = |x: usize, y: usize| mask.as_ref().is_some_and(|m| m.get(x, y) == Some(HAND_CLASS));
+    let pixels = (step / 2..camera.height)
+        .step_by(step)
+        .flat_map(|y| (step / 2..camera.width).step_by(step).map(move |x| (x, y)))
+        .filter(|&(x, y)| !is_hand(x, y));
+    if let Some(normals) = recording.normals(view)? {
+        return Ok(pixels
+            .filter_map(|(x, y)| normals.get(x, y))
+            .map(|n| Vector::new(f64::from(n[0]), f64::from(n[1]), f64::from(n[2])))
+            .filter(|n| n.norm() > 0.5)
+            .collect());
+    }
+    let Some(depth) = recording.depth(view)? else { return Ok(Vec::new()) };
+    Ok(pixels.filter_map(|(x, y)| slope_normal(&depth, recording, x, y)).collect())
+}
+
+/// Normal from the depths a few pixels to each side; `None` at depth edges and holes.
+fn slope_normal(depth: &Grid<f32>, recording: &Recording, x: usize, y: usize) -> Option<Vector> {
+    const REACH: usize = 4;
+    let at = |x: usize, y: usize| -> Option<Point> {
+        let z = f64::from(depth.get(x, y)?);
+        (z > 0.0).then(|| recording.camera.unproject(x as f64, y as f64, z))
+    };
+    let centre = at(x, y)?;
+    let (left, right) = (at(x.checked_sub(REACH)?, y)?, at(x + REACH, y)?);
+    let (above, below) = (at(x, y.checked_sub(REACH)?)?, at(x, y + REACH)?);
+    // Both sides of a pixel lie on one plane; at an edge the middle does not lie between them.
+    let bend = (left.z + right.z - 2.0 * centre.z).abs() + (above.z + below.z - 2.0 * centre.z).abs();
+    if bend > 0.02 * centre.z {
+        return None;
+    }
+    let normal = unit(&(right - left).cross(&(below - above)))?;
+    Some(if normal.dot(&centre.coords) > 0.0 { -normal } else { normal })
+}
+
+/// Dominant orthogonal triple of one frame: the largest k-means cluster, and the two that are most orthogonal (§A.5).
+fn frame_triple(normals: &[Vector], k: usize) -> Option<[(Vector, f64); 3]> {
+    // Fewer normals than this per cluster are noise.
+    if normals.len() < 10 * k {
+        return None;
+    }
+    let clusters = kmeans(normals, k, 20);
+    let first = clusters.first()?;
+    let mut best: Option<(f64, usize, usize)> = None;
+    for s in 1..clusters.len() {
+        for t in s + 1..clusters.len() {
+            let (cs, ct) = (&clusters[s].center, &clusters[t].center);
+            let cost = cs.dot(&first.center).abs() + first.center.dot(ct).abs() + cs.dot(ct).abs();
+            if best.is_none_or(|b| cost < b.0) {
+                best = Some((cost, s, t));
+            }
+        }
+    }
+    // Three exactly orthogonal directions cost 0; a frame that sees one wall and its noise costs more than this.
+    let (_, s, t) = best.filter(|b| b.0 < 0.6)?;
+    Some([0, s, t].map(|i| (clusters[i].center, clusters[i].count as f64 / normals.len() as f64)))
+}
+
+/// Mean shift over all frames' axes, then the nearest rotation to the three heaviest orthogonal modes.
+fn combine(axes: &[(Vector, f64)], up: &Vector, bandwidth: f64) -> Option<[Vector; 3]> {
+    let modes = mean_shift(axes, bandwidth);
+    let first = modes.first()?.axis;
+    // Within 15 degrees of orthogonal: the rest is another structure.
+    let orthogonal = |a: &Vector, b: &Vector| a.dot(b).abs() < 15f64.to_radians().sin();
+    let second = modes.iter().find(|m| orthogonal(&m.axis, &first))?.axis;
+    let third = modes
+        .iter()
+        .find(|m| orthogonal(&m.axis, &first) && orthogonal(&m.axis, &second))
+        .map_or_else(|| first.cross(&second), |m| m.axis);
+    let third = if first.cross(&second).dot(&third) < 0.0 { -third } else { third };
+    let svd = Matrix3::from_columns(&[first, second, third]).svd(true, true);
+    let rotation = Rotation3::from_matrix_unchecked(svd.u? * svd.v_t?);
+    let mut axes: Vec<Vector> = (0..3).map(|i| rotation.matrix().column(i).into_owned()).collect();
+    axes.sort_by(|a, b| a.dot(up).abs().total_cmp(&b.dot(up).abs()));
+    let vertical = if axes[2].dot(up) < 0.0 { -axes[2] } else { axes[2] };
+    Some([axes[0], vertical.cross(&axes[0]), vertical])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{rotation, unsigned_angle};
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, Normal};
+
+    /// Three walls seen with 10 degrees of noise from several directions give the room's frame back.
+    #[test]
+    fn a_noisy_room_has_its_frame() {
+        let room = rotation(&Vector::z(), 0.4);
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(5);
+        let noise = Normal::new(0.0, 0.17).unwrap();
+        let mut axes = Vec::new();
+        for view in 0..8 {
+            let camera = rotation(&Vector::new(0.3, 0.1, 1.0).normalize(), 0.2 * f64::from(view));
+            let mut normals = Vec::new();
+            for (axis, copies) in [(Vector::y(), 300), (Vector::x(), 100), (Vector::z(), 200)] {
+                for _ in 0..copies {
+                    let jitter = Vector::from_fn(|_, _| noise.sample(&mut rng));
+                    normals.push(camera * (room * axis + jitter).normalize());
+                }
+            }
+            let triple = frame_triple(&normals, 6).unwrap();
+            axes.extend(triple.map(|(a, w)| (camera.inverse() * a, w)));
+        }
+        let found = combine(&axes, &Vector::z(), 12f64.to_radians()).unwrap();
+        for axis in [Vector::x(), Vector::y(), Vector::z()] {
+            let best = found.iter().map(|f| unsigned_angle(f, &(room * axis))).fold(f64::INFINITY, f64::min);
+            assert!(best.to_degrees() < 2.0, "{}", best.to_degrees());
+        }
+        assert!(found[2].dot(&Vector::z()) > 0.99);
+        assert!((found[0].cross(&found[1]) - found[2]).norm() < 1e-9);
+    }
+
+    #[test]
+    fn one_wall_gives_no_frame() {
+        assert!(frame_triple(&vec![Vector::z(); 500], 6).is_none());
+    }
+}

@@ -1,0 +1,13 @@
+//! Static geometry: 3D lines for hinges, directions for slides, and the touched front face (§3.2, algorithm 1, §A.4, §A.5).
+
+pub mod candidates;
+pub mod face;
+pub mod manhattan;
+pub mod moved;
+pub mod segments;
+pub mod tracks;
+
+pub use candidates::{AxisCandidate, AxisSource, HingeSide};
+pub use face::Face;
+pub use manhattan::ManhattanFrame;
+pub use tracks::LineTrack;

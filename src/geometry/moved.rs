@@ -1,0 +1,307 @@
+//! Which part of the front face moved: what was there when closed and is empty, or elsewhere, when open (ours).
+//!
+//! Masks cover whole pieces of furniture; depth before and after the interaction tells the moving part from the rest
+//! without knowing the joint.
+
+use serde::{Deserialize, Serialize};
+
+use super::Face;
+use crate::articulation::{Action, Articulation};
+use crate::config;
+use crate::error::Result;
+use crate::hands::Trajectory;
+use crate::math::{Point, Pose};
+use crate::recording::{Camera, Clip, Grid, HAND_CLASS, Recording};
+
+/// A rectangle in face coordinates, metres: `[right, up][min, max]`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Rect {
+    /// `[[right_min, right_max], [up_min, up_max]]`.
+    pub bounds: [[f64; 2]; 2],
+}
+
+impl Rect {
+    /// Width (along right) and height (along up).
+    #[must_use]
+    pub fn size(&self) -> [f64; 2] {
+        self.bounds.map(|b| b[1] - b[0])
+    }
+}
+
+/// What the views say about each cell of the face.
+#[derive(Debug, Clone)]
+pub struct CellVotes {
+    cell_m: f64,
+    origin: [f64; 2],
+    columns: usize,
+    rows: usize,
+    /// Seen on the closed plane while closed.
+    closed: Vec<u16>,
+    /// Seen on the closed plane while open.
+    still: Vec<u16>,
+    /// Seen through while open, or seen where the moved part would be.
+    gone: Vec<u16>,
+}
+
+/// A decoded view of the furniture, with the grip's position where the hand holds the part in it.
+#[derive(Debug, Clone)]
+pub struct View {
+    /// Frame index.
+    pub frame: usize,
+    camera_from_world: Pose,
+    camera: Camera,
+    depth: Grid<f32>,
+    mask: Option<Grid<u8>>,
+    /// Where the hand holds the part, world.
+    pub grip: Option<Point>,
+}
+
+impl View {
+    /// Decodes a frame; `None` where it has no depth.
+    pub fn load(recording: &Recording, frame: usize, grip: Option<Point>) -> Result<Option<Self>> {
+        let Some(depth) = recording.depth(frame)? else { return Ok(None) };
+        Ok(Some(Self {
+            frame,
+            camera_from_world: recording.frames[frame].world_from_camera.inverse(),
+            camera: recording.camera,
+            depth,
+            mask: recording.mask(frame)?,
+            grip,
+        }))
+    }
+
+    /// How far behind the world point `p` the seen surface lies (negative: in front of it), and the depth of `p`.
+    /// `None` outside the image, under a hand or where there is no depth.
+    fn gap(&self, p: &Point) -> Option<(f64, f64)> {
+        let local = self.camera_from_world * p;
+        let (u, v) = self.camera.project(&local).filter(|_| local.z > 0.15)?;
+        if self.mask.as_ref().and_then(|m| m.nearest(u, v)) == Some(HAND_CLASS) {
+            return None;
+        }
+        let z = f64::from(self.depth.nearest(u, v)?);
+        (z > 0.0).then_some((z - local.z, local.z))
+    }
+}
+
+/// Views of the open state: while the hand holds the part far from closed, and just after or before it does.
+pub fn open_views(recording: &Recording, clip: &Clip, trajectory: &Trajectory) -> Result<Vec<View>> {
+    const HELD: usize = 6;
+    const FREE: usize = 3;
+    let closed = trajectory.closed_grip();
+    let travel = |p: &Point| (p - closed).norm();
+    let furthest = trajectory.samples.iter().map(|s| travel(&s.smoothed)).fold(0.0, f64::max);
+    let far: Vec<_> = trajectory.samples.iter().filter(|s| travel(&s.smoothed) > 0.5 * furthest).collect();
+    let mut views = Vec::new();
+    for i in 0..far.len().min(HELD) {
+        let sample = far[i * far.len() / far.len().min(HELD)];
+        views.extend(View::load(recording, sample.frame, Some(sample.smoothed))?);
+    }
+    // Once let go the part stays where it was left, until the next clip moves something.
+    let [first, last] = trajectory.contact_frames();
+    let in_other_clip = |f: usize| {
+        recording
+            .clips
+            .iter()
+            .any(|c| c.clip != clip.clip && c.end_frame > c.start_frame && (c.start_frame..=c.end_frame).contains(&f))
+    };
+    let free: Vec<usize> = match trajectory.action {
+        Action::Open => (last + 1..recording.frames.len()).take_while(|f| !in_other_clip(*f)).take(4 * FREE).collect(),
+        Action::Close => (0..first).rev().take_while(|f| !in_other_clip(*f)).take(4 * FREE).collect(),
+    };
+    for i in 0..free.len().min(FREE) {
+        views.extend(View::load(recording, free[i * free.len() / free.len().min(FREE)], Some(trajectory.open_grip()))?);
+    }
+    Ok(views)
+}
+
+/// How well a joint explains the open views: of the face's points that it moves clearly, the share that is seen where it
+/// puts them rather than seen through there, and the number of points. `rect` bounds the points where it is known.
+#[must_use]
+pub fn agreement(face: &Face, rect: Option<&Rect>, joint: &Articulation, grip: &Point, views: &[View]) -> (f64, usize) {
+    // Without a known part, a piece of its face around the grip that the smallest front has.
+    const HALF_M: f64 = 0.12;
+    const STEPS: usize = 12;
+    let bounds = rect.map_or([[-HALF_M, HALF_M]; 2], |r| r.bounds);
+    let (mut there, mut through) = (0usize, 0usize);
+    for view in views {
+        let Some(held) = view.grip else { continue };
+        let motion = joint.motion(joint.opening_at(grip, &held));
+        for i in 0..STEPS * STEPS {
+            let at = |k: usize, b: [f64; 2]| b[0] + (b[1] - b[0]) * (k as f64 + 0.5) / STEPS as f64;
+            let here = face.point(at(i % STEPS, bounds[0]), at(i / STEPS, bounds[1]), 0.0);
+            let moved = motion * here;
+            let Some((gap, z)) = view.gap(&moved) else { continue };
+            if (moved - here).norm() < 2.0 * tolerance(z) {
+                continue;
+            }
+            there += usize::from(gap.abs() <= tolerance(z));
+            through += usize::from(gap > tolerance(z));
+        }
+    }
+    let count = there + through;
+    (there as f64 / count.max(1) as f64, count)
+}
+
+/// Depth noise that a surface at distance `z` may show: half a voxel and 2 % of the distance (metric depth estimates).
+fn tolerance(z: f64) -> f64 {
+    0.025 + 0.02 * z
+}
+
+/// Votes of closed and open views over the face's visible extent (at most 1.2 m from the grip). With a `joint`, cells also
+/// count as moved where the part is seen in its opened place.
+#[must_use]
+pub fn vote(
+    face: &Face,
+    closed: &[View],
+    open: &[View],
+    joint: Option<(&Articulation, &Point)>,
+    config: &config::Fitting,
+) -> CellVotes {
+    const REACH_M: f64 = 1.2;
+    // The extent comes from the confident region; its rim is a voxel coarse.
+    const MARGIN_M: f64 = 0.1;
+    let low = [0, 1].map(|i| (face.extent[i][0] - MARGIN_M).max(-REACH_M));
+    let high = [0, 1].map(|i| (face.extent[i][1] + MARGIN_M).min(REACH_M));
+    let columns = ((high[0] - low[0]) / config.cell_m).ceil().max(1.0) as usize;
+    let rows = ((high[1] - low[1]) / config.cell_m).ceil().max(1.0) as usize;
+    let mut votes = CellVotes {
+        cell_m: config.cell_m,
+        origin: low,
+        columns,
+        rows,
+        closed: vec![0; columns * rows],
+        still: vec![0; columns * rows],
+        gone: vec![0; columns * rows],
+    };
+    for i in 0..columns * rows {
+        let [right, up] = votes.cell(i % columns, i / columns);
+        let here = face.point(right, up, 0.0);
+        for view in closed {
+            votes.closed[i] += u16::from(view.gap(&here).is_some_and(|(gap, z)| gap.abs() <= tolerance(z)));
+        }
+        for view in open {
+            if let Some((gap, z)) = view.gap(&here) {
+                votes.still[i] += u16::from(gap.abs() <= tolerance(z));
+                // Seen through by clearly more than a door's thickness.
+                votes.gone[i] += u16::from(gap > tolerance(z) + 0.04);
+            }
+            let (Some((joint, grip)), Some(held)) = (joint, view.grip) else { continue };
+            let moved = joint.motion(joint.opening_at(grip, &held)) * here;
+            // Only where the part has moved clear of its own noise.
+            if let Some((gap, z)) = view.gap(&moved)
+                && (moved - here).norm() > 2.0 * tolerance(z)
+            {
+                votes.gone[i] += u16::from(gap.abs() <= tolerance(z));
+                votes.still[i] += u16::from(gap > tolerance(z));
+            }
+        }
+    }
+    votes
+}
+
+impl CellVotes {
+    /// Centre of a cell in face coordinates.
+    fn cell(&self, column: usize, row: usize) -> [f64; 2] {
+        [self.origin[0] + (column as f64 + 0.5) * self.cell_m, self.origin[1] + (row as f64 + 0.5) * self.cell_m]
+    }
+
+    /// The rectangle of the connected piece of moved cells at the grip; `None` where nothing there is seen to move.
+    #[must_use]
+    pub fn moving_rect(&self) -> Option<Rect> {
+        // A front of 15 x 15 cm is the smallest drawer.
+        const MIN_AREA_M2: f64 = 0.02;
+        let moving: Vec<bool> =
+            (0..self.closed.len()).map(|i| self.gone[i] > self.still[i] && self.closed[i] > 0).collect();
+        let piece = self.piece_at_grip(&moving)?;
+        if piece.len() as f64 * self.cell_m * self.cell_m < MIN_AREA_M2 {
+            return None;
+        }
+        let (mut by_column, mut by_row) = (vec![0usize; self.columns], vec![0usize; self.rows]);
+        for &i in &piece {
+            by_column[i % self.columns] += 1;
+            by_row[i / self.columns] += 1;
+        }
+        // A rectangle's rows are equally full: rows with under a third of the fullest are fringe.
+        let span = |counts: &[usize], origin: f64| -> Option<[f64; 2]> {
+            let limit = counts.iter().max()? / 3;
+            let first = counts.iter().position(|&c| c > limit)?;
+            let last = counts.iter().rposition(|&c| c > limit)?;
+            Some([origin + first as f64 * self.cell_m, origin + (last + 1) as f64 * self.cell_m])
+        };
+        Some(Rect { bounds: [span(&by_column, self.origin[0])?, span(&by_row, self.origin[1])?] })
+    }
+
+    /// The 4-connected piece of marked cells nearest to the grip (the face's origin), if within 25 cm of it.
+    fn piece_at_grip(&self, marked: &[bool]) -> Option<Vec<usize>> {
+        const NEAR_M: f64 = 0.25;
+        let distance = |i: usize| {
+            let [r, u] = self.cell(i % self.columns, i / self.columns);
+            r.hypot(u)
+        };
+        let mut taken = vec![false; marked.len()];
+        let mut best: Option<Vec<usize>> = None;
+        for start in 0..marked.len() {
+            if !marked[start] || taken[start] || distance(start) > NEAR_M {
+                continue;
+            }
+            taken[start] = true;
+            let mut piece = vec![start];
+            let mut next = 0;
+            while let Some(&i) = piece.get(next) {
+                next += 1;
+                let (c, r) = (i % self.columns, i / self.columns);
+                let neighbours = [
+                    (c > 0).then(|| i - 1),
+                    (c + 1 < self.columns).then(|| i + 1),
+                    (r > 0).then(|| i - self.columns),
+                    (r + 1 < self.rows).then(|| i + self.columns),
+                ];
+                for n in neighbours.into_iter().flatten() {
+                    if marked[n] && !taken[n] {
+                        taken[n] = true;
+                        piece.push(n);
+                    }
+                }
+            }
+            // Noise makes islands: of the pieces near the grip the largest is the part.
+            if best.as_ref().is_none_or(|b| piece.len() > b.len()) {
+                best = Some(piece);
+            }
+        }
+        best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fringe_and_islands_do_not_widen_the_part() {
+        let (columns, rows) = (40, 30);
+        let mut votes = CellVotes {
+            cell_m: 0.02,
+            origin: [-0.4, -0.3],
+            columns,
+            rows,
+            closed: vec![1; columns * rows],
+            still: vec![1; columns * rows],
+            gone: vec![0; columns * rows],
+        };
+        for r in 5..25 {
+            for c in 10..30 {
+                votes.gone[r * columns + c] = 3;
+            }
+        }
+        for c in 30..38 {
+            votes.gone[15 * columns + c] = 3;
+        }
+        votes.gone[2 * columns + 2] = 9;
+        let rect = votes.moving_rect().unwrap();
+        for (found, expected) in rect.bounds.iter().flatten().zip([-0.2, 0.2, -0.2, 0.2]) {
+            assert!((found - expected).abs() < 1e-9, "{rect:?}");
+        }
+        votes.gone.fill(0);
+        assert!(votes.moving_rect().is_none());
+    }
+}

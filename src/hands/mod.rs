@@ -1,0 +1,182 @@
+//! Dynamic interaction: fingertips to a contact-trimmed, smoothed trajectory (§3.1, §A.2).
+
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use crate::articulation::{Action, Outcome};
+use crate::config;
+use crate::math::kalman::{self, Filter};
+use crate::math::ou::IntegratedOu;
+use crate::math::{Point, Vector, centroid};
+use crate::recording::narration::Reading;
+use crate::recording::{Clip, HandSample, Recording, Side};
+
+/// One sample of the hand while it holds the part.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Sample {
+    /// Frame index.
+    pub frame: usize,
+    /// Seconds.
+    pub time_secs: f64,
+    /// `z_t`: mean of the three fingertips as detected, world.
+    pub observed: Point,
+    /// `p_t`: after gate and RTS smoothing, world.
+    pub smoothed: Point,
+    /// Whether the observation passed the gate.
+    pub accepted: bool,
+}
+
+/// The hand's path while it is in contact.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Trajectory {
+    /// Which hand; `None` for a bare trajectory.
+    pub side: Option<Side>,
+    /// Samples in contact, in time order; never empty.
+    pub samples: Vec<Sample>,
+    /// Opening or closing: from the narration, else from the motion relative to the person.
+    pub action: Action,
+}
+
+impl Trajectory {
+    /// First and last frame in contact.
+    #[must_use]
+    pub fn contact_frames(&self) -> [usize; 2] {
+        [self.samples.first().map_or(0, |s| s.frame), self.samples.last().map_or(0, |s| s.frame)]
+    }
+
+    /// Smoothed positions.
+    #[must_use]
+    pub fn positions(&self) -> Vec<Point> {
+        self.samples.iter().map(|s| s.smoothed).collect()
+    }
+
+    /// Where the grip is at the closed end of the motion: the mean of the samples nearest to it.
+    #[must_use]
+    pub fn closed_grip(&self) -> Point {
+        self.end(self.action == Action::Open)
+    }
+
+    /// Where the grip is at the open end of the motion.
+    #[must_use]
+    pub fn open_grip(&self) -> Point {
+        self.end(self.action == Action::Close)
+    }
+
+    fn end(&self, first: bool) -> Point {
+        let positions = self.positions();
+        // A few samples: one is noisy, many have already moved.
+        let count = (positions.len() / 8).clamp(1, 4);
+        let part = if first { &positions[..count] } else { &positions[positions.len() - count..] };
+        centroid(part).unwrap_or(positions[0])
+    }
+}
+
+/// Extracts the trajectory of the hand that does the work in a clip.
+#[must_use]
+pub fn trajectory(
+    recording: &Recording,
+    clip: &Clip,
+    reading: &Reading,
+    config: &config::Hands,
+) -> Outcome<Trajectory> {
+    let in_clip: Vec<&HandSample> =
+        recording.hands.iter().filter(|s| (clip.start_frame..=clip.end_frame).contains(&s.frame)).collect();
+    if in_clip.is_empty() {
+        return Outcome::Abstained("no hand was detected in the clip".to_owned());
+    }
+    let best = [Side::Right, Side::Left]
+        .into_iter()
+        .map(|side| {
+            let samples: Vec<&HandSample> = in_clip.iter().copied().filter(|s| s.side == side).collect();
+            let (score, span) = if config.use_contact {
+                contact_span(&samples.iter().map(|s| s.contact).collect::<Vec<_>>())
+            } else {
+                (samples.len(), 0..samples.len())
+            };
+            (score, side, samples[span].to_vec())
+        })
+        .max_by_key(|(score, side, _)| (*score, *side == Side::Right));
+    let Some((_, side, held)) = best.filter(|(_, _, held)| held.len() >= config.min_samples) else {
+        return Outcome::Abstained(format!(
+            "fewer than {} hand samples in contact ({} hand samples in the clip)",
+            config.min_samples,
+            in_clip.len()
+        ));
+    };
+    let times: Vec<f64> = held.iter().map(|s| recording.frames[s.frame].timestamp_secs).collect();
+    let observed: Vec<Point> = held.iter().map(|s| s.grasp()).collect();
+    let smoothed = kalman::smooth(&times, &observed, &filter(config));
+    let samples: Vec<Sample> = held
+        .iter()
+        .enumerate()
+        .map(|(i, s)| Sample {
+            frame: s.frame,
+            time_secs: times[i],
+            observed: observed[i],
+            smoothed: smoothed.positions[i],
+            accepted: smoothed.accepted[i],
+        })
+        .collect();
+    let action = reading.action.unwrap_or_else(|| action_by_person(recording, &samples));
+    Outcome::Found(Trajectory { side: Some(side), samples, action })
+}
+
+/// The filter of §A.2 with the gate of its p-value.
+#[must_use]
+pub fn filter(config: &config::Hands) -> Filter {
+    // A constructor of three degrees of freedom cannot fail; infinity would switch the gate off.
+    let gate = ChiSquared::new(3.0).map_or(f64::INFINITY, |d| d.inverse_cdf(1.0 - config.gate_p_value));
+    Filter {
+        motion: IntegratedOu::from_time_and_speed(config.correlation_secs, config.speed_std_m_per_s),
+        observation_std_m: config.observation_std_m,
+        gate,
+        restart_after: config.restart_after,
+    }
+}
+
+/// The one stretch of contact that explains noisy flags best, and its score.
+///
+/// With equal rates of false and missed contact the likelihood of a stretch is the sum of +1 for each flagged and -1 for
+/// each other sample in it (a left-to-right chain before, during, after), so the best one is the maximum-sum stretch.
+fn contact_span(flags: &[bool]) -> (usize, std::ops::Range<usize>) {
+    let (mut best, mut best_span) = (0i64, 0..0);
+    let (mut sum, mut start) = (0i64, 0);
+    for (i, &flag) in flags.iter().enumerate() {
+        if sum <= 0 {
+            (sum, start) = (0, i);
+        }
+        sum += if flag { 1 } else { -1 };
+        if sum > best {
+            (best, best_span) = (sum, start..i + 1);
+        }
+    }
+    (best.unsigned_abs() as usize, best_span)
+}
+
+/// Without a word for it: what opens comes towards the person.
+fn action_by_person(recording: &Recording, samples: &[Sample]) -> Action {
+    let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return Action::Open };
+    let center = samples.iter().fold(Vector::zeros(), |sum, s| sum + recording.frames[s.frame].center().coords)
+        / samples.len() as f64;
+    let distance = |p: &Point| (p.coords - center).norm();
+    if distance(&last.smoothed) <= distance(&first.smoothed) { Action::Open } else { Action::Close }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn contact_is_one_stretch_despite_wrong_flags() {
+        let flags: Vec<bool> = "0100011101111011110010".chars().map(|c| c == '1').collect();
+        let (_, span) = contact_span(&flags);
+        assert_eq!(span, 5..18);
+        assert_eq!(contact_span(&[false, false]).1, 0..0);
+        assert_eq!(contact_span(&[]).1, 0..0);
+    }
+
+    #[test]
+    fn the_gate_is_the_papers() {
+        assert!((filter(&config::Hands::default()).gate - 7.814_728).abs() < 1e-5);
+    }
+}

@@ -1,0 +1,171 @@
+//! Trajectory, geometry and the answers to the two questions become a joint (§3.4, §A.7).
+
+pub mod aggregate;
+pub mod bare;
+
+use serde::{Deserialize, Serialize};
+
+use crate::articulation::{Action, Articulation, JointKind, Outcome};
+use crate::config;
+use crate::geometry::{AxisCandidate, AxisSource, Face};
+use crate::hands::Trajectory;
+use crate::math::{Point, Vector, path, stats};
+use crate::reasoning::Answer;
+
+/// The joint of one clip, with what speaks for it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ClipJoint {
+    /// The joint; positive opens.
+    pub joint: Articulation,
+    /// The hand centroid's projection on the axis, the paper's origin (§A.7); for a slide the first contact point.
+    pub contact_pivot: Point,
+    /// Where the axis comes from.
+    pub source: AxisSource,
+    /// Probability of the type.
+    pub type_probability: f64,
+    /// Share of the weight of all explanations of that type that agrees with this axis.
+    pub axis_probability: f64,
+    /// Root mean square distance of the smoothed hand from the joint's path, metres.
+    pub residual_m: f64,
+    /// Share of hand samples within the torus (§B.1) or the slide's tolerance.
+    pub inliers: f64,
+    /// Distance of the hand from the hinge, metres.
+    pub radius_m: Option<f64>,
+    /// Opening that the hand went through, rad or m.
+    pub observed_range: f64,
+    /// The grip when closed, world.
+    pub grip: Point,
+    /// Opening or closing.
+    pub action: Action,
+}
+
+/// Applies the rules of §A.7 to the candidates under the reasoner's weights.
+#[must_use]
+pub fn infer(
+    trajectory: &Trajectory,
+    candidates: &[AxisCandidate],
+    answer: &Answer,
+    face: Option<&Face>,
+    reasoning: &config::Reasoning,
+    config: &config::Inference,
+) -> Outcome<ClipJoint> {
+    let kind = if answer.revolute_probability >= 0.5 { JointKind::Revolute } else { JointKind::Prismatic };
+    let mut ranked: Vec<(f64, &AxisCandidate)> = answer
+        .log_weights
+        .iter()
+        .zip(candidates)
+        .filter(|(w, c)| c.joint.kind == kind && w.is_finite())
+        .map(|(w, c)| (*w, c))
+        .collect();
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let Some(&(_, best)) = ranked.first() else {
+        return Outcome::Abstained(match kind {
+            JointKind::Revolute => format!(
+                "no candidate hinge between {} and {} m from the hand",
+                config.min_radius_m, config.max_radius_m
+            ),
+            JointKind::Prismatic => "no direction for a slide".to_owned(),
+        });
+    };
+    let path = trajectory.positions();
+    let joint = refined_sense(best.joint, trajectory, face);
+    let (residual, inliers, radius_m) = match kind {
+        JointKind::Revolute => {
+            let Some(fit) = path::about_line(&path, &joint.line(), |r| torus_tolerance(r, config)) else {
+                return Outcome::Abstained("no hand samples".to_owned());
+            };
+            (fit.variance().sqrt(), fit.inliers, Some(fit.radius))
+        }
+        JointKind::Prismatic => {
+            // The paper's 2 cm contradicts its own 5 cm of hand noise: twice the noise is what a valid path needs.
+            let tolerance = config.prismatic_tolerance_m.max(2.0 * reasoning.hand_std_m);
+            let Some(fit) = path::along(&path, &joint.axis, tolerance) else {
+                return Outcome::Abstained("no hand samples".to_owned());
+            };
+            if fit.inliers < config.prismatic_min_inliers {
+                return Outcome::Abstained(format!(
+                    "only {:.0} % of the hand samples lie on any slide ({:.0} % are needed)",
+                    100.0 * fit.inliers,
+                    100.0 * config.prismatic_min_inliers
+                ));
+            }
+            (fit.variance.sqrt(), fit.inliers, None)
+        }
+    };
+    let contact_pivot = match kind {
+        JointKind::Revolute => crate::math::centroid(&path).map_or(joint.origin, |c| joint.line().project(&c)),
+        JointKind::Prismatic => path[0],
+    };
+    let total: f64 = ranked.iter().map(|(w, _)| (w - ranked[0].0).exp()).sum();
+    let agreeing: f64 =
+        ranked.iter().filter(|(_, c)| same_axis(&c.joint, &best.joint)).map(|(w, _)| (w - ranked[0].0).exp()).sum();
+    let grip = trajectory.closed_grip();
+    Outcome::Found(ClipJoint {
+        joint,
+        contact_pivot,
+        source: best.source,
+        type_probability: answer.revolute_probability.max(1.0 - answer.revolute_probability),
+        axis_probability: agreeing / total,
+        residual_m: residual,
+        inliers,
+        radius_m,
+        observed_range: observed_range(&joint, &grip, &path),
+        grip,
+        action: trajectory.action,
+    })
+}
+
+/// Half-thickness of the torus about a mean radius (§B.1).
+#[must_use]
+pub fn torus_tolerance(radius: f64, config: &config::Inference) -> f64 {
+    (config.torus_tolerance_ratio * radius).clamp(config.torus_tolerance_min_m, config.torus_tolerance_max_m)
+}
+
+/// Opening that the path goes through: from the closed to the open end without the extreme twentieths, rad or m.
+#[must_use]
+pub fn observed_range(joint: &Articulation, grip: &Point, path: &[Point]) -> f64 {
+    let openings = openings(joint, grip, path);
+    let (low, high) = (stats::quantile(&openings, 0.03), stats::quantile(&openings, 0.97));
+    low.zip(high).map_or(0.0, |(low, high)| high - low)
+}
+
+/// Opening at each point of a path, continuous.
+#[must_use]
+pub fn openings(joint: &Articulation, grip: &Point, path: &[Point]) -> Vec<f64> {
+    let raw: Vec<f64> = path.iter().map(|p| joint.opening_at(grip, p)).collect();
+    if joint.kind == JointKind::Revolute { stats::unwrap_angles(&raw) } else { raw }
+}
+
+/// Positive opens. The face tells for joints that leave it; within the face, and without one, the motion does.
+fn refined_sense(joint: Articulation, trajectory: &Trajectory, face: Option<&Face>) -> Articulation {
+    let leaves_face = face.is_some_and(|f| {
+        let out = match joint.kind {
+            JointKind::Revolute => joint.axis.cross(&(trajectory.closed_grip() - joint.origin)).normalize(),
+            JointKind::Prismatic => joint.axis,
+        };
+        out.dot(&f.normal).abs() > 0.3
+    });
+    if leaves_face {
+        return joint;
+    }
+    let opened = joint.opening_at(&trajectory.closed_grip(), &trajectory.open_grip());
+    if opened < 0.0 { joint.reversed() } else { joint }
+}
+
+/// Whether two joints are one explanation: directions within 8 degrees, hinges within 8 cm.
+fn same_axis(a: &Articulation, b: &Articulation) -> bool {
+    let near = a.kind == JointKind::Prismatic || a.line().distance(&b.origin) < 0.08;
+    crate::math::unsigned_angle(&a.axis, &b.axis) < 8f64.to_radians() && near
+}
+
+/// A unit vector as the mean of directions without sign, the first one giving the sense.
+pub(crate) fn mean_direction(directions: &[(Vector, f64)]) -> Option<Vector> {
+    let mut scatter = nalgebra::Matrix3::zeros();
+    for (d, w) in directions {
+        scatter += d * d.transpose() * *w;
+    }
+    let (axes, _) = crate::math::eigen_descending(scatter);
+    let axis: Vector = axes.column(0).into_owned();
+    let first = directions.first()?.0;
+    Some(if axis.dot(&first) < 0.0 { -axis } else { axis })
+}

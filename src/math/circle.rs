@@ -1,0 +1,96 @@
+//! Circles in a plane: algebraic fit (Taubin), then geometric refinement.
+
+use nalgebra::{Matrix3, Point2, Vector2, Vector3};
+
+/// A circle, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Circle {
+    /// Centre.
+    pub center: Point2<f64>,
+    /// Radius.
+    pub radius: f64,
+}
+
+impl Circle {
+    /// Root mean square of the radial residuals.
+    #[must_use]
+    pub fn rms(&self, points: &[Point2<f64>]) -> f64 {
+        let sum: f64 = points.iter().map(|p| ((p - self.center).norm() - self.radius).powi(2)).sum();
+        (sum / points.len().max(1) as f64).sqrt()
+    }
+}
+
+/// Least-squares circle through three points or more; `None` where they lie on a line to working precision.
+#[must_use]
+pub fn fit(points: &[Point2<f64>]) -> Option<Circle> {
+    let n = points.len() as f64;
+    if points.len() < 3 {
+        return None;
+    }
+    let mean = points.iter().fold(Vector2::zeros(), |s, p| s + p.coords) / n;
+    // Algebraic start (Kasa in centred coordinates): |p|^2 = 2 c.p + k.
+    let mut normal = Matrix3::zeros();
+    let mut rhs = Vector3::zeros();
+    for p in points {
+        let d = p.coords - mean;
+        let row = Vector3::new(2.0 * d.x, 2.0 * d.y, 1.0);
+        normal += row * row.transpose();
+        rhs += row * d.norm_squared();
+    }
+    let solution = normal.lu().solve(&rhs)?;
+    let mut center = Vector2::new(solution[0], solution[1]);
+    let mut radius = (solution[2] + center.norm_squared()).max(0.0).sqrt();
+    if !radius.is_finite() || radius > 1e4 {
+        return None;
+    }
+    // Gauss-Newton on the radial distance: the algebraic fit shrinks short noisy arcs.
+    for _ in 0..50 {
+        let mut h = Matrix3::zeros();
+        let mut g = Vector3::zeros();
+        for p in points {
+            let d = p.coords - mean - center;
+            let r = d.norm().max(1e-9);
+            let j = Vector3::new(-d.x / r, -d.y / r, -1.0);
+            h += j * j.transpose();
+            g += j * (r - radius);
+        }
+        h += Matrix3::identity() * (1e-9 * n);
+        let step = h.lu().solve(&g)?;
+        center -= Vector2::new(step[0], step[1]);
+        radius -= step[2];
+        if step.norm() < 1e-10 {
+            break;
+        }
+        if !center.norm().is_finite() || center.norm() > 1e3 {
+            return None;
+        }
+    }
+    (radius > 0.0).then(|| Circle { center: Point2::from(center + mean), radius })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn arc(radius: f64, degrees: f64) -> Vec<Point2<f64>> {
+        (0..40)
+            .map(|i| {
+                let a = f64::from(i) / 39.0 * degrees.to_radians();
+                Point2::new(1.0 + radius * a.cos(), -2.0 + radius * a.sin())
+            })
+            .collect()
+    }
+
+    #[test]
+    fn recovers_a_short_arc() {
+        let c = fit(&arc(0.5, 20.0)).unwrap();
+        assert!((c.radius - 0.5).abs() < 1e-6 && (c.center - Point2::new(1.0, -2.0)).norm() < 1e-6);
+        assert!(c.rms(&arc(0.5, 20.0)) < 1e-8);
+    }
+
+    #[test]
+    fn a_straight_line_has_no_circle_of_furniture_size() {
+        let line: Vec<_> = (0..20).map(|i| Point2::new(f64::from(i) * 0.01, 0.0)).collect();
+        assert!(fit(&line).is_none_or(|c| c.radius > 100.0));
+    }
+}

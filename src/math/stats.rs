@@ -1,0 +1,65 @@
+//! Order statistics and small helpers. NaN sorts last; an empty slice gives `None`.
+
+/// The `q`-quantile (0..=1) with linear interpolation.
+#[must_use]
+pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
+    if values.is_empty() {
+        return None;
+    }
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let position = q.clamp(0.0, 1.0) * (sorted.len() - 1) as f64;
+    let low = position.floor() as usize;
+    let high = position.ceil() as usize;
+    Some(sorted[low] + (sorted[high] - sorted[low]) * (position - low as f64))
+}
+
+/// The median.
+#[must_use]
+pub fn median(values: &[f64]) -> Option<f64> {
+    quantile(values, 0.5)
+}
+
+/// Mean; `None` for an empty slice.
+#[must_use]
+pub fn mean(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
+/// Population variance; `None` for an empty slice.
+#[must_use]
+pub fn variance(values: &[f64]) -> Option<f64> {
+    let m = mean(values)?;
+    Some(values.iter().map(|v| (v - m).powi(2)).sum::<f64>() / values.len() as f64)
+}
+
+/// Angles made continuous: each one moved by full turns to lie within half a turn of the one before.
+#[must_use]
+pub fn unwrap_angles(angles: &[f64]) -> Vec<f64> {
+    let turn = std::f64::consts::TAU;
+    let mut out: Vec<f64> = Vec::with_capacity(angles.len());
+    for &a in angles {
+        let next = out.last().map_or(a, |&last| a - ((a - last) / turn).round() * turn);
+        out.push(next);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_interpolate() {
+        assert_eq!(quantile(&[3.0, 1.0, 2.0], 0.5), Some(2.0));
+        assert_eq!(quantile(&[1.0, 2.0], 0.25), Some(1.25));
+        assert_eq!(median(&[]), None);
+    }
+
+    #[test]
+    fn unwrapping_follows_a_door_past_half_a_turn() {
+        let wrapped = [3.0, 3.1, -3.1, -3.0];
+        let u = unwrap_angles(&wrapped);
+        assert!(u.windows(2).all(|w| (w[1] - w[0]).abs() < 0.2), "{u:?}");
+    }
+}

@@ -1,0 +1,358 @@
+//! The whole paper on one screen: every step in order, every intermediate kept.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::articulation::{Articulation, Outcome};
+use crate::config::Config;
+use crate::error::{Error, Result};
+use crate::geometry::moved::{self, Rect, View};
+use crate::geometry::segments::{LiftedSegment, LineDetector, lift_view};
+use crate::geometry::{AxisCandidate, Face, LineTrack, ManhattanFrame, candidates, face, manhattan, tracks};
+use crate::hands::{self, Trajectory};
+use crate::inference::{self, ClipJoint, aggregate};
+use crate::localization::{self, Region, views};
+use crate::math::Point;
+use crate::reasoning::{Answer, PartShape, Question, Reasoner};
+use crate::recording::narration::{self, Reading};
+use crate::recording::{Clip, Recording};
+
+/// Everything that was found out about one clip, step by step.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct ClipResult {
+    /// The clip.
+    pub clip: Clip,
+    /// Hands (§3.1).
+    pub trajectory: Option<Trajectory>,
+    /// Localisation (§3.1).
+    pub region: Option<Region>,
+    /// Global views (§3.2).
+    pub views: Vec<usize>,
+    /// 3D lines (§3.2).
+    pub lines: Vec<LineTrack>,
+    /// The touched face.
+    pub face: Option<Face>,
+    /// The part of the face that was seen to move.
+    pub part: Option<Rect>,
+    /// Candidate axes (§3.2).
+    pub candidates: Vec<AxisCandidate>,
+    /// The answers to the two questions (§3.3).
+    pub answer: Option<Answer>,
+    /// The joint (§3.4), or the reason why there is none.
+    pub joint: Outcome<ClipJoint>,
+}
+
+/// One joint of the scene with all that the later steps need to know about it.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct SceneJoint {
+    /// Name, unique in the scene.
+    pub id: String,
+    /// The merged joint; positive opens.
+    pub joint: Articulation,
+    /// Names of the clips that show it.
+    pub clips: Vec<String>,
+    /// The word that people used for the furniture.
+    pub furniture: Option<String>,
+    /// Probability of the type.
+    pub type_probability: f64,
+    /// The grip when closed, world.
+    pub grip: Point,
+    /// The touched face.
+    pub face: Option<Face>,
+    /// The moving part of the face.
+    pub part: Option<Rect>,
+    /// Largest opening that was observed, rad or m.
+    pub observed_range: f64,
+}
+
+/// The scene.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Scene {
+    /// The recording's name.
+    pub recording: String,
+    /// The room's frame (§A.5).
+    pub manhattan: Option<ManhattanFrame>,
+    /// Clips in the recording's order.
+    pub clips: Vec<ClipResult>,
+    /// Joints in the order of their first clip.
+    pub joints: Vec<SceneJoint>,
+}
+
+/// Told how far the work is: (step, done, total).
+pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
+
+/// Runs hands, localisation, geometry, reasoning, inference and aggregation.
+///
+/// # Errors
+/// Only what makes the whole recording unusable, and images that cannot be decoded. A clip without an answer is an
+/// answer: its reason stands in [`ClipResult::joint`].
+pub fn infer(
+    recording: &Recording,
+    config: &Config,
+    detector: &dyn LineDetector,
+    reasoner: &dyn Reasoner,
+    progress: Progress,
+) -> Result<Scene> {
+    check_depth(recording)?;
+    // Hands and localisation, clip by clip.
+    let total = recording.clips.len();
+    let counter = std::sync::atomic::AtomicUsize::new(0);
+    let tick = |step: &str, total: usize| {
+        let done = counter.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
+        progress(step, done, total);
+    };
+    let located: Vec<Located> = recording
+        .clips
+        .par_iter()
+        .map(|clip| {
+            let located = locate(recording, clip, config);
+            tick("localising", total);
+            located
+        })
+        .collect::<Result<_>>()?;
+
+    // Every global view is decoded once, however many clips look through it.
+    let mut wanted: Vec<usize> = located.iter().flat_map(|l| l.views.iter().copied()).collect();
+    wanted.sort_unstable();
+    wanted.dedup();
+    counter.store(0, std::sync::atomic::Ordering::Relaxed);
+    let lifted: BTreeMap<usize, Vec<LiftedSegment>> = wanted
+        .par_iter()
+        .map(|&view| {
+            let segments = lift_view(recording, view, detector, &config.geometry, config.seed)?;
+            tick("finding lines", wanted.len());
+            Ok((view, segments))
+        })
+        .collect::<Result<_>>()?;
+    let room = manhattan::estimate(recording, &with_normals_first(recording, &wanted), &config.geometry)?;
+
+    counter.store(0, std::sync::atomic::Ordering::Relaxed);
+    let clips: Vec<ClipResult> = recording
+        .clips
+        .par_iter()
+        .zip(located)
+        .map(|(clip, located)| {
+            let result = infer_clip(recording, clip, located, &lifted, room.as_ref(), reasoner, config);
+            tick("inferring", total);
+            result
+        })
+        .collect::<Result<_>>()?;
+    let joints = merge(&clips, config);
+    Ok(Scene { recording: recording.name.clone(), manhattan: room, clips, joints })
+}
+
+/// Zero depth everywhere is an export gone wrong, not a scene; a few frames tell.
+fn check_depth(recording: &Recording) -> Result<()> {
+    let with_depth: Vec<usize> =
+        (0..recording.frames.len()).filter(|&f| recording.frames[f].files.depth.is_some()).collect();
+    if with_depth.is_empty() {
+        if recording.reconstruction.is_empty() {
+            return Err(Error::Recording {
+                path: recording.dir.clone(),
+                faults: vec![
+                    "no depth: there is neither depth/000000.png ... nor reconstruction.ply or .obj; run a metric depth \
+                     estimator (MoGe-2) or add a static reconstruction"
+                        .to_owned(),
+                ],
+            });
+        }
+        return Ok(());
+    }
+    for i in 0..with_depth.len().min(8) {
+        let frame = with_depth[i * with_depth.len() / with_depth.len().min(8)];
+        if recording.depth(frame)?.is_some_and(|d| d.data.iter().any(|z| *z > 0.0)) {
+            return Ok(());
+        }
+    }
+    Err(Error::Recording {
+        path: recording.dir.clone(),
+        faults: vec![
+            "depth: every value is 0 = no value; depth must be 16-bit PNG in millimetres (were metres written as integers?)"
+                .to_owned(),
+        ],
+    })
+}
+
+/// A clip after hands and localisation.
+struct Located {
+    reading: Reading,
+    trajectory: Option<Trajectory>,
+    region: Option<Region>,
+    views: Vec<usize>,
+    reason: Option<String>,
+}
+
+fn locate(recording: &Recording, clip: &Clip, config: &Config) -> Result<Located> {
+    let reading = narration::read(clip);
+    let mut located = Located { reading, trajectory: None, region: None, views: Vec::new(), reason: None };
+    if located.reading.moves_joint == Some(false) {
+        located.reason = Some(format!("the narration \"{}\" moves no door or drawer", clip.narration));
+        return Ok(located);
+    }
+    let trajectory = match hands::trajectory(recording, clip, &located.reading, &config.hands) {
+        Outcome::Found(t) => t,
+        Outcome::Abstained(reason) => {
+            located.reason = Some(reason);
+            return Ok(located);
+        }
+    };
+    match localization::localize(recording, clip, &trajectory, &config.localization)? {
+        Outcome::Found(region) => {
+            located.views = views::reselect(recording, &region, &config.localization);
+            located.region = Some(region);
+        }
+        Outcome::Abstained(reason) => located.reason = Some(reason),
+    }
+    located.trajectory = Some(trajectory);
+    Ok(located)
+}
+
+/// Views for the room's frame: those with a normals file first, at most thirty.
+fn with_normals_first(recording: &Recording, views: &[usize]) -> Vec<usize> {
+    // The frame of a room is known to a fraction of a degree from far fewer.
+    const ENOUGH: usize = 30;
+    let (with, without): (Vec<usize>, Vec<usize>) =
+        views.iter().partition(|&&v| recording.frames[v].files.normals.is_some());
+    let all: Vec<usize> = if with.len() >= 5 { with } else { with.into_iter().chain(without).collect() };
+    (0..all.len().min(ENOUGH)).map(|i| all[i * all.len() / all.len().min(ENOUGH)]).collect()
+}
+
+fn infer_clip(
+    recording: &Recording,
+    clip: &Clip,
+    located: Located,
+    lifted: &BTreeMap<usize, Vec<LiftedSegment>>,
+    room: Option<&ManhattanFrame>,
+    reasoner: &dyn Reasoner,
+    config: &Config,
+) -> Result<ClipResult> {
+    let mut result = ClipResult {
+        clip: clip.clone(),
+        trajectory: located.trajectory,
+        region: located.region,
+        views: located.views,
+        lines: Vec::new(),
+        face: None,
+        part: None,
+        candidates: Vec::new(),
+        answer: None,
+        joint: Outcome::Abstained(located.reason.unwrap_or_default()),
+    };
+    let (Some(trajectory), Some(region)) = (&result.trajectory, &result.region) else { return Ok(result) };
+
+    let in_views: Vec<&LiftedSegment> = result.views.iter().filter_map(|v| lifted.get(v)).flatten().collect();
+    result.lines = tracks::build(&in_views, region, &config.geometry, config.seed);
+    result.face = face::fit(region, room, &recording.up(), &config.geometry, config.seed);
+
+    let path = trajectory.positions();
+    let open = moved::open_views(recording, clip, trajectory)?;
+    let closed = load_views(recording, &region.local_frames)?;
+    if let Some(face) = &result.face {
+        result.part = moved::vote(face, &closed, &open, None, &config.fitting).moving_rect();
+    }
+    result.candidates = candidates::collect(
+        &candidates::Evidence {
+            face: result.face.as_ref(),
+            rect: result.part.as_ref(),
+            tracks: &result.lines,
+            manhattan: room,
+            grip: region.grip,
+            path: &path,
+        },
+        &config.inference,
+    );
+    let agreement: Vec<(f64, usize)> = result
+        .candidates
+        .iter()
+        .map(|c| {
+            result
+                .face
+                .as_ref()
+                .map_or((0.0, 0), |f| moved::agreement(f, result.part.as_ref(), &c.joint, &region.grip, &open))
+        })
+        .collect();
+    let answer = reasoner.answer(&Question {
+        reading: &located.reading,
+        path: &path,
+        grip: region.grip,
+        candidates: &result.candidates,
+        agreement: &agreement,
+        part: result.part.as_ref().map(part_shape),
+    });
+    result.joint = inference::infer(
+        trajectory,
+        &result.candidates,
+        &answer,
+        result.face.as_ref(),
+        &config.reasoning,
+        &config.inference,
+    );
+    // With the joint known, the part is also seen where the joint puts it: the rectangle again, from all evidence.
+    if let (Some(face), Outcome::Found(joint)) = (&result.face, &result.joint) {
+        let votes = moved::vote(face, &closed, &open, Some((&joint.joint, &region.grip)), &config.fitting);
+        result.part = votes.moving_rect().or(result.part);
+    }
+    result.answer = Some(answer);
+    Ok(result)
+}
+
+fn load_views(recording: &Recording, frames: &[usize]) -> Result<Vec<View>> {
+    let mut views = Vec::new();
+    for &frame in frames {
+        views.extend(View::load(recording, frame, None)?);
+    }
+    Ok(views)
+}
+
+/// The grip is the origin of the face's coordinates.
+fn part_shape(rect: &Rect) -> PartShape {
+    let size_m = rect.size();
+    let grip = [0, 1].map(|i| -0.5 * (rect.bounds[i][0] + rect.bounds[i][1]) / size_m[i].max(1e-6));
+    PartShape { size_m, grip }
+}
+
+/// Clips to scene-level joints (§C.2).
+fn merge(clips: &[ClipResult], config: &Config) -> Vec<SceneJoint> {
+    let members: Vec<aggregate::Member> = clips
+        .iter()
+        .enumerate()
+        .filter_map(|(i, c)| c.joint.found().map(|joint| aggregate::Member { clip: i, joint, face: c.face.as_ref() }))
+        .collect();
+    aggregate::group(&members, &config.inference)
+        .iter()
+        .filter_map(|group| aggregate::merge(&members, group).map(|merged| (group, merged)))
+        .enumerate()
+        .map(|(i, (group, merged))| {
+            let of_group = || group.iter().map(|&m| &clips[members[m].clip]);
+            // The clip that shows most of the motion has the best view of the part.
+            let best = group
+                .iter()
+                .max_by(|&&a, &&b| {
+                    let range = |m: usize| {
+                        let c = &clips[members[m].clip];
+                        members[m].joint.observed_range + if c.part.is_some() { 10.0 } else { 0.0 }
+                    };
+                    range(a).total_cmp(&range(b))
+                })
+                .map_or(members[group[0]].clip, |&m| members[m].clip);
+            let observed_range = group
+                .iter()
+                .filter_map(|&m| clips[members[m].clip].trajectory.as_ref())
+                .map(|t| inference::observed_range(&merged.joint, &t.closed_grip(), &t.positions()))
+                .fold(0.0, f64::max);
+            SceneJoint {
+                id: format!("joint_{i}"),
+                joint: merged.joint,
+                clips: merged.clips.iter().map(|&c| clips[c].clip.clip.clone()).collect(),
+                furniture: of_group().find_map(|c| narration::read(&c.clip).furniture),
+                type_probability: merged.type_probability,
+                grip: merged.grip,
+                face: clips[best].face,
+                part: clips[best].part,
+                observed_range,
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,116 @@
+//! Decoding of the images of a recording. Every error names the file and what to do.
+
+use std::path::Path;
+
+use image::{DynamicImage, ImageReader};
+
+use super::{Camera, Grid};
+use crate::error::{Error, Result};
+use crate::math::{Point, Pose};
+
+/// Half-width of the square that a point of a reconstruction covers in an image, metres: half of the paper's voxel.
+const SPLAT_RADIUS_M: f64 = 0.025;
+
+/// A decoder may claim any size; a 1408 x 1408 RGB frame needs 6 MB.
+const MAX_IMAGE_BYTES: u64 = 1 << 30;
+
+fn decode(path: &Path, camera: &Camera) -> Result<DynamicImage> {
+    let mut reader =
+        ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(|e| Error::io(path, &e))?;
+    let mut limits = image::Limits::default();
+    limits.max_alloc = Some(MAX_IMAGE_BYTES);
+    reader.limits(limits);
+    let image = reader.decode().map_err(|e| {
+        Error::format(path, "image", format!("cannot be decoded ({e}); export this frame again or delete the file"))
+    })?;
+    if (image.width() as usize, image.height() as usize) != (camera.width, camera.height) {
+        return Err(Error::format(
+            path,
+            "image",
+            format!(
+                "is {} x {} but cameras.json says {} x {}; resize one of them (and scale fx, fy, cx, cy)",
+                image.width(),
+                image.height(),
+                camera.width,
+                camera.height
+            ),
+        ));
+    }
+    Ok(image)
+}
+
+fn grid<T>(camera: &Camera, data: Vec<T>) -> Grid<T> {
+    Grid { width: camera.width, height: camera.height, data }
+}
+
+/// 16-bit millimetres along the optical axis to metres; 0 stays 0 = no value.
+pub fn depth(path: &Path, camera: &Camera) -> Result<Grid<f32>> {
+    match decode(path, camera)? {
+        DynamicImage::ImageLuma16(image) => {
+            Ok(grid(camera, image.into_raw().into_iter().map(|mm| f32::from(mm) * 1e-3).collect()))
+        }
+        other => Err(Error::format(
+            path,
+            "image",
+            format!("depth must be 16-bit grey in millimetres, this is {:?}", other.color()),
+        )),
+    }
+}
+
+/// 8-bit class numbers.
+pub fn classes(path: &Path, camera: &Camera) -> Result<Grid<u8>> {
+    match decode(path, camera)? {
+        DynamicImage::ImageLuma8(image) => Ok(grid(camera, image.into_raw())),
+        other => {
+            Err(Error::format(path, "image", format!("a mask must be 8-bit grey classes, this is {:?}", other.color())))
+        }
+    }
+}
+
+/// Luma of any colour image.
+pub fn grey(path: &Path, camera: &Camera) -> Result<Grid<u8>> {
+    Ok(grid(camera, decode(path, camera)?.into_luma8().into_raw()))
+}
+
+/// `n = (value - 128) / 127`, normalised; (0, 0, 0) and vectors far from unit length become zero = no value.
+pub fn normals(path: &Path, camera: &Camera) -> Result<Grid<[f32; 3]>> {
+    match decode(path, camera)? {
+        DynamicImage::ImageRgb8(image) => Ok(grid(
+            camera,
+            image
+                .pixels()
+                .map(|p| {
+                    let n = p.0.map(|c| (f32::from(c) - 128.0) / 127.0);
+                    let norm = n.iter().map(|c| c * c).sum::<f32>().sqrt();
+                    if p.0 == [0, 0, 0] || !(0.8..1.2).contains(&norm) { [0.0; 3] } else { n.map(|c| c / norm) }
+                })
+                .collect(),
+        )),
+        other => Err(Error::format(path, "image", format!("normals must be 8-bit RGB, this is {:?}", other.color()))),
+    }
+}
+
+/// Depth of a point cloud seen from a pose: each point a small square, the nearest one wins.
+#[must_use]
+pub fn splat(points: &[Point], world_from_camera: &Pose, camera: &Camera) -> Grid<f32> {
+    let mut depth = Grid::filled(camera.width, camera.height, 0.0f32);
+    let camera_from_world = world_from_camera.inverse();
+    for p in points {
+        let p = camera_from_world * p;
+        let Some((u, v)) = camera.project(&p).filter(|&(u, v)| p.z > 0.1 && camera.contains(u, v)) else { continue };
+        let reach = (SPLAT_RADIUS_M / p.z * camera.fx).min(12.0);
+        let range = |c: f64, size: usize| {
+            let low = (c - reach).round().max(0.0) as usize;
+            low..=((c + reach).round().max(0.0) as usize).min(size - 1)
+        };
+        for y in range(v, camera.height) {
+            for x in range(u, camera.width) {
+                let d = &mut depth.data[y * camera.width + x];
+                if *d == 0.0 || p.z < f64::from(*d) {
+                    *d = p.z as f32;
+                }
+            }
+        }
+    }
+    depth
+}

@@ -1,0 +1,213 @@
+//! What was seen: the only input of every step. Reading is here and in `import`; images are decoded when asked for.
+//!
+//! The layout on disk is described in `docs/recording-format.md`.
+
+pub mod grid;
+pub mod images;
+pub mod narration;
+mod read;
+pub(crate) use read::json;
+pub mod trajectory;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::Result;
+use crate::math::{Point, Pose, Vector};
+pub use grid::Grid;
+
+/// Class of a hand's pixel in a mask.
+pub const HAND_CLASS: u8 = 255;
+
+/// A pinhole camera in OpenCV axes (x right, y down, z forward); integer pixels are pixel centres.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Camera {
+    /// Image width, pixels.
+    pub width: usize,
+    /// Image height, pixels.
+    pub height: usize,
+    /// Focal length in x, pixels.
+    pub fx: f64,
+    /// Focal length in y, pixels.
+    pub fy: f64,
+    /// Principal point, x.
+    pub cx: f64,
+    /// Principal point, y.
+    pub cy: f64,
+}
+
+impl Camera {
+    /// Point in the camera frame at pixel (u, v) and depth `z` along the optical axis.
+    #[must_use]
+    pub fn unproject(&self, u: f64, v: f64, z: f64) -> Point {
+        Point::new((u - self.cx) / self.fx * z, (v - self.cy) / self.fy * z, z)
+    }
+
+    /// Pixel of a point in the camera frame; `None` at or behind the camera.
+    #[must_use]
+    pub fn project(&self, p: &Point) -> Option<(f64, f64)> {
+        (p.z > 1e-6).then(|| (self.fx * p.x / p.z + self.cx, self.fy * p.y / p.z + self.cy))
+    }
+
+    /// Whether pixel (u, v) lies on the image.
+    #[must_use]
+    pub fn contains(&self, u: f64, v: f64) -> bool {
+        u >= -0.5 && v >= -0.5 && u < self.width as f64 - 0.5 && v < self.height as f64 - 0.5
+    }
+}
+
+/// Files of one frame; each is optional.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct FrameFiles {
+    /// RGB image.
+    pub rgb: Option<PathBuf>,
+    /// Depth along z, 16-bit millimetres, 0 = none.
+    pub depth: Option<PathBuf>,
+    /// Normals in the camera frame, facing the camera.
+    pub normals: Option<PathBuf>,
+    /// Class per pixel.
+    pub mask: Option<PathBuf>,
+}
+
+/// One frame of the video.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    /// Seconds.
+    pub timestamp_secs: f64,
+    /// Camera to world.
+    pub world_from_camera: Pose,
+    /// What is on disk.
+    pub files: FrameFiles,
+}
+
+impl Frame {
+    /// Camera centre in the world.
+    #[must_use]
+    pub fn center(&self) -> Point {
+        Point::from(self.world_from_camera.translation.vector)
+    }
+}
+
+/// A narrated segment of the video (§3.1).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Clip {
+    /// Name, unique in the recording.
+    pub clip: String,
+    /// First frame.
+    pub start_frame: usize,
+    /// Last frame, included.
+    pub end_frame: usize,
+    /// What the person says or an annotator wrote.
+    #[serde(default)]
+    pub narration: String,
+    /// Its verb.
+    #[serde(default)]
+    pub verb: String,
+    /// Its noun.
+    #[serde(default)]
+    pub noun: String,
+}
+
+/// Left or right.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Side {
+    /// The left hand.
+    Left,
+    /// The right hand.
+    Right,
+}
+
+/// One detected hand in one frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HandSample {
+    /// Frame index.
+    pub frame: usize,
+    /// Which hand.
+    pub side: Side,
+    /// The contact detector's opinion.
+    pub contact: bool,
+    /// Thumb, index and middle fingertips in the world.
+    pub tips: [Point; 3],
+}
+
+impl HandSample {
+    /// `z_t`: the mean of the three tips (§A.2).
+    #[must_use]
+    pub fn grasp(&self) -> Point {
+        Point::from((self.tips[0].coords + self.tips[1].coords + self.tips[2].coords) / 3.0)
+    }
+}
+
+/// A recording: poses, narrations and hands in memory, images on disk.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    /// The folder's name.
+    pub name: String,
+    /// The folder.
+    pub dir: PathBuf,
+    /// Intrinsics.
+    pub camera: Camera,
+    /// Frames in time order.
+    pub frames: Vec<Frame>,
+    /// Narrated segments.
+    pub clips: Vec<Clip>,
+    /// Hands, by frame.
+    pub hands: Vec<HandSample>,
+    /// Mask class to name.
+    pub labels: BTreeMap<u8, String>,
+    /// Points of a static reconstruction (`reconstruction.ply` or `.obj`), world frame; empty where there is none.
+    pub reconstruction: Vec<Point>,
+}
+
+impl Recording {
+    /// Reads and checks a folder. All faults are reported at once.
+    pub fn open(dir: &std::path::Path) -> Result<Self> {
+        read::open(dir)
+    }
+
+    /// The world's up direction (+Z by convention; good to about a degree).
+    #[must_use]
+    pub fn up(&self) -> Vector {
+        Vector::z()
+    }
+
+    /// Depth in metres along the optical axis; 0 = none. A frame without a depth file gets the static reconstruction as
+    /// seen from it; `None` where there is neither.
+    pub fn depth(&self, frame: usize) -> Result<Option<Grid<f32>>> {
+        let depth = self.read(frame, |f| f.depth.as_ref(), images::depth)?;
+        if depth.is_some() || self.reconstruction.is_empty() {
+            return Ok(depth);
+        }
+        Ok(self.frames.get(frame).map(|f| images::splat(&self.reconstruction, &f.world_from_camera, &self.camera)))
+    }
+
+    /// Mask classes. `None` where the frame has no mask file.
+    pub fn mask(&self, frame: usize) -> Result<Option<Grid<u8>>> {
+        self.read(frame, |f| f.mask.as_ref(), images::classes)
+    }
+
+    /// Grey image. `None` where the frame has no image file.
+    pub fn grey(&self, frame: usize) -> Result<Option<Grid<u8>>> {
+        self.read(frame, |f| f.rgb.as_ref(), images::grey)
+    }
+
+    /// Unit normals in the camera frame; zero = none. `None` where the frame has no normals file.
+    pub fn normals(&self, frame: usize) -> Result<Option<Grid<[f32; 3]>>> {
+        self.read(frame, |f| f.normals.as_ref(), images::normals)
+    }
+
+    fn read<T>(
+        &self,
+        frame: usize,
+        file: impl Fn(&FrameFiles) -> Option<&PathBuf>,
+        decode: impl Fn(&std::path::Path, &Camera) -> Result<Grid<T>>,
+    ) -> Result<Option<Grid<T>>> {
+        match self.frames.get(frame).and_then(|f| file(&f.files)) {
+            Some(path) => decode(path, &self.camera).map(Some),
+            None => Ok(None),
+        }
+    }
+}

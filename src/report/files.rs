@@ -1,0 +1,161 @@
+//! The result files: `articulations.json`, `predictions.json`.
+
+use serde::Serialize;
+
+use crate::articulation::{Articulation, Outcome};
+use crate::evaluation::{Prediction, Predictions};
+use crate::inference::{self, ClipJoint};
+use crate::math::Point;
+use crate::pipeline::Scene;
+use crate::twin::Twin;
+
+/// One joint of `articulations.json`.
+#[derive(Debug, Serialize)]
+struct JointEntry<'a> {
+    id: &'a str,
+    furniture: Option<&'a str>,
+    #[serde(flatten)]
+    joint: Articulation,
+    type_probability: f64,
+    observed_range: f64,
+    grip: Point,
+    clips: &'a [String],
+}
+
+/// One clip of `articulations.json`.
+#[derive(Debug, Serialize)]
+struct ClipEntry<'a> {
+    clip: &'a str,
+    narration: &'a str,
+    joint_of_scene: Option<&'a str>,
+    outcome: &'a Outcome<ClipJoint>,
+    evidence: Evidence,
+}
+
+/// How much of everything there was.
+#[derive(Debug, Serialize)]
+struct Evidence {
+    hand_samples: usize,
+    rejected_hand_samples: usize,
+    confident_voxels: usize,
+    local_frames: Vec<usize>,
+    global_views: usize,
+    lines: usize,
+    candidates: usize,
+    face_found: bool,
+    part_seen_to_move: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct ArticulationsFile<'a> {
+    recording: &'a str,
+    frame: &'static str,
+    reasoner: &'a str,
+    manhattan: Option<[crate::math::Vector; 3]>,
+    joints: Vec<JointEntry<'a>>,
+    clips: Vec<ClipEntry<'a>>,
+}
+
+/// `articulations.json`: every joint and every clip with its evidence.
+///
+/// # Errors
+/// Where a number cannot be written, which would be a bug.
+pub fn articulations(scene: &Scene, reasoner: &str) -> crate::error::Result<String> {
+    let file = ArticulationsFile {
+        recording: &scene.recording,
+        frame: "world of the recording; metres, radians; positive motion opens",
+        reasoner,
+        manhattan: scene.manhattan.map(|m| m.axes),
+        joints: scene
+            .joints
+            .iter()
+            .map(|j| JointEntry {
+                id: &j.id,
+                furniture: j.furniture.as_deref(),
+                joint: j.joint,
+                type_probability: j.type_probability,
+                observed_range: j.observed_range,
+                grip: j.grip,
+                clips: &j.clips,
+            })
+            .collect(),
+        clips: scene
+            .clips
+            .iter()
+            .map(|c| ClipEntry {
+                clip: &c.clip.clip,
+                narration: &c.clip.narration,
+                joint_of_scene: scene.joints.iter().find(|j| j.clips.contains(&c.clip.clip)).map(|j| j.id.as_str()),
+                outcome: &c.joint,
+                evidence: Evidence {
+                    hand_samples: c.trajectory.as_ref().map_or(0, |t| t.samples.len()),
+                    rejected_hand_samples: c
+                        .trajectory
+                        .as_ref()
+                        .map_or(0, |t| t.samples.iter().filter(|s| !s.accepted).count()),
+                    confident_voxels: c.region.as_ref().map_or(0, |r| r.voxels.len()),
+                    local_frames: c.region.as_ref().map_or_else(Vec::new, |r| r.local_frames.clone()),
+                    global_views: c.views.len(),
+                    lines: c.lines.len(),
+                    candidates: c.candidates.len(),
+                    face_found: c.face.is_some(),
+                    part_seen_to_move: c.part.is_some(),
+                },
+            })
+            .collect(),
+    };
+    to_json(&file)
+}
+
+/// Pretty JSON with a final newline.
+///
+/// # Errors
+/// Where a value cannot be written as JSON.
+pub fn to_json<T: Serialize>(value: &T) -> crate::error::Result<String> {
+    let mut text = serde_json::to_string_pretty(value)
+        .map_err(|e| crate::error::Error::Export(format!("cannot be written as JSON: {e}")))?;
+    text.push('\n');
+    Ok(text)
+}
+
+/// One row a clip: the scene's joint where the clip shows one, its own range, the twin's box.
+#[must_use]
+pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
+    let rows = scene
+        .clips
+        .iter()
+        .map(|c| {
+            let mut row = Prediction {
+                recording: scene.recording.clone(),
+                clip: c.clip.clip.clone(),
+                kind: None,
+                axis: None,
+                origin: None,
+                contact_pivot: None,
+                range: None,
+                part_box: None,
+                confidence: None,
+                joint: None,
+                reason: c.joint.reason().map(str::to_owned),
+            };
+            let joint = scene.joints.iter().find(|j| j.clips.contains(&c.clip.clip));
+            let part = joint.and_then(|j| twin.furniture.iter().map(|f| &f.part).find(|p| p.id == j.id));
+            let (Some(joint), Some(part), Some(trajectory)) = (joint, part, &c.trajectory) else { return row };
+            let phi = part.joint.articulation;
+            let path = trajectory.positions();
+            row.kind = Some(phi.kind);
+            row.axis = Some(phi.axis);
+            row.origin = Some(phi.origin);
+            row.contact_pivot = crate::math::centroid(&path).map(|p| match phi.kind {
+                crate::articulation::JointKind::Revolute => phi.line().project(&p),
+                crate::articulation::JointKind::Prismatic => path[0],
+            });
+            row.range = Some(inference::observed_range(&phi, &trajectory.closed_grip(), &path));
+            row.part_box = Some(part.bounds);
+            row.confidence = Some(joint.type_probability);
+            row.joint = Some(joint.id.clone());
+            row
+        })
+        .collect();
+    Predictions { predictions: rows }
+}

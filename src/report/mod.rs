@@ -1,0 +1,5 @@
+//! What a person reads: tables, files of results, the page.
+
+pub mod files;
+pub mod page;
+pub mod table;

@@ -1,0 +1,300 @@
+//! What gets built: boxes, joints and masses of a scene, all in the world frame with everything closed.
+
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
+use serde::{Deserialize, Serialize};
+
+use crate::articulation::{Articulation, JointKind};
+use crate::math::{Point, Pose, Vector};
+
+/// A box of any orientation.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(from = "BoxFile", into = "BoxFile")]
+pub struct OrientedBox {
+    /// Centre, world, metres.
+    pub center: Point,
+    /// Half sizes along the box's own axes, metres.
+    pub half: Vector,
+    /// The box's axes in the world as columns: `world_from_box` rotation.
+    pub rotation: Matrix3<f64>,
+}
+
+/// The same as rows of `R`, as the recording format has it.
+#[derive(Serialize, Deserialize)]
+struct BoxFile {
+    center: Point,
+    half: Vector,
+    #[serde(rename = "R")]
+    rows: [[f64; 3]; 3],
+}
+
+impl From<BoxFile> for OrientedBox {
+    fn from(file: BoxFile) -> Self {
+        Self { center: file.center, half: file.half, rotation: Matrix3::from_fn(|r, c| file.rows[r][c]) }
+    }
+}
+
+impl From<OrientedBox> for BoxFile {
+    fn from(b: OrientedBox) -> Self {
+        Self { center: b.center, half: b.half, rows: [0, 1, 2].map(|r| [0, 1, 2].map(|c| b.rotation[(r, c)])) }
+    }
+}
+
+impl OrientedBox {
+    /// Volume, m^3.
+    #[must_use]
+    pub fn volume(&self) -> f64 {
+        8.0 * self.half.product()
+    }
+
+    /// `world_from_box`.
+    #[must_use]
+    pub fn pose(&self) -> Pose {
+        Pose::from_parts(self.center.coords.into(), self.orientation())
+    }
+
+    /// Rotation `world_from_box`.
+    #[must_use]
+    pub fn orientation(&self) -> UnitQuaternion<f64> {
+        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(self.rotation))
+    }
+
+    /// The same box moved.
+    #[must_use]
+    pub fn moved(&self, motion: &Pose) -> Self {
+        Self {
+            center: motion * self.center,
+            half: self.half,
+            rotation: motion.rotation.to_rotation_matrix().matrix() * self.rotation,
+        }
+    }
+
+    /// The eight corners.
+    #[must_use]
+    pub fn corners(&self) -> [Point; 8] {
+        std::array::from_fn(|i| {
+            let sign = |bit: usize| if i >> bit & 1 == 0 { -1.0 } else { 1.0 };
+            let local = Vector::new(sign(0) * self.half.x, sign(1) * self.half.y, sign(2) * self.half.z);
+            self.center + self.rotation * local
+        })
+    }
+
+    /// Whether a point is inside.
+    #[must_use]
+    pub fn contains(&self, p: &Point) -> bool {
+        let local = self.rotation.transpose() * (p - self.center);
+        (0..3).all(|i| local[i].abs() <= self.half[i])
+    }
+
+    /// The same box with no side thinner than `thickness`.
+    #[must_use]
+    pub fn thickened(&self, thickness: f64) -> Self {
+        Self { half: self.half.map(|h| h.max(0.5 * thickness)), ..*self }
+    }
+
+    /// Inertia of the solid box about its own centre in world axes for a mass, kg m^2.
+    #[must_use]
+    pub fn inertia(&self, mass: f64) -> Matrix3<f64> {
+        let [x, y, z] = [0, 1, 2].map(|i| (2.0 * self.half[i]).powi(2));
+        let own = Matrix3::from_diagonal(&(Vector::new(y + z, x + z, x + y) * (mass / 12.0)));
+        self.rotation * own * self.rotation.transpose()
+    }
+}
+
+/// Intersection over union of two boxes, by a grid of 24^3 points in each; good to about 0.02.
+#[must_use]
+pub fn box_iou(a: &OrientedBox, b: &OrientedBox) -> f64 {
+    const N: usize = 24;
+    let share = |from: &OrientedBox, of: &OrientedBox| {
+        let at = |i: usize| (i as f64 + 0.5) / N as f64 * 2.0 - 1.0;
+        let inside = (0..N * N * N)
+            .filter(|i| {
+                let local = Vector::new(at(i % N), at(i / N % N), at(i / N / N)).component_mul(&from.half);
+                of.contains(&(from.center + from.rotation * local))
+            })
+            .count();
+        inside as f64 / (N * N * N) as f64 * from.volume()
+    };
+    let both = 0.5 * (share(a, b) + share(b, a));
+    let union = a.volume() + b.volume() - both;
+    if union > 0.0 { both / union } else { 0.0 }
+}
+
+/// What a box stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// Door leaf or drawer front.
+    Front,
+    /// Bar or post of a handle.
+    Handle,
+    /// Side, bottom or back of a drawer.
+    Tray,
+    /// Board of the fixed furniture.
+    Carcass,
+}
+
+/// One solid box.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Solid {
+    /// Name, unique in the twin.
+    pub name: String,
+    /// What it is.
+    pub role: Role,
+    /// Its box when closed.
+    pub shape: OrientedBox,
+    /// Seen in the recording (true) or assumed (false).
+    pub seen: bool,
+}
+
+/// The joint of a part.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Joint {
+    /// Type, axis (positive opens) and origin: on a hinge the point nearest to the part's middle.
+    pub articulation: Articulation,
+    /// Upper limit, rad or m; the lower one is 0 = closed.
+    pub upper: f64,
+    /// Largest opening that was observed, rad or m.
+    pub observed: f64,
+    /// Viscous damping, N m s/rad or N s/m.
+    pub damping: f64,
+    /// Dry friction, N m or N.
+    pub friction: f64,
+}
+
+/// Mass, centre of mass and inertia.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MassProperties {
+    /// kg.
+    pub mass: f64,
+    /// World, closed.
+    pub center: Point,
+    /// About the centre, world axes, kg m^2.
+    pub inertia: Matrix3<f64>,
+}
+
+/// A moving part.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Part {
+    /// Name: the joint's id.
+    pub id: String,
+    /// Words for people.
+    pub label: String,
+    /// The joint.
+    pub joint: Joint,
+    /// The boxes of the part.
+    pub solids: Vec<Solid>,
+    /// Where the hand holds it when closed, world.
+    pub handle: Point,
+    /// Box around the whole part, in the axes of its face.
+    pub bounds: OrientedBox,
+}
+
+/// A piece of furniture: fixed boards and the part that moves in them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Furniture {
+    /// Name, unique in the twin.
+    pub name: String,
+    /// Fixed boards.
+    pub carcass: Vec<Solid>,
+    /// The moving part.
+    pub part: Part,
+}
+
+/// The whole scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Twin {
+    /// Name of the scene.
+    pub name: String,
+    /// Density of all boxes, kg/m^3.
+    pub density_kg_per_m3: f64,
+    /// Furniture in the order of the joints.
+    pub furniture: Vec<Furniture>,
+}
+
+/// Mass properties of boxes of one density; `None` for no boxes.
+#[must_use]
+pub fn mass_properties(solids: &[Solid], density: f64) -> Option<MassProperties> {
+    let mass: f64 = solids.iter().map(|s| s.shape.volume() * density).sum();
+    if mass <= 0.0 {
+        return None;
+    }
+    let center =
+        solids.iter().fold(Vector::zeros(), |sum, s| sum + s.shape.center.coords * (s.shape.volume() * density)) / mass;
+    let inertia = solids.iter().fold(Matrix3::zeros(), |sum, s| {
+        let m = s.shape.volume() * density;
+        let d = s.shape.center.coords - center;
+        sum + s.shape.inertia(m) + (Matrix3::identity() * d.norm_squared() - d * d.transpose()) * m
+    });
+    Some(MassProperties { mass, center: Point::from(center), inertia: (inertia + inertia.transpose()) * 0.5 })
+}
+
+impl Joint {
+    /// The most force (N) or torque (N m) an actuator or a person may apply through the joint.
+    #[must_use]
+    pub fn effort(&self) -> f64 {
+        match self.articulation.kind {
+            JointKind::Revolute => 50.0,
+            JointKind::Prismatic => 200.0,
+        }
+    }
+
+    /// Velocity limit, rad/s or m/s.
+    #[must_use]
+    pub fn velocity(&self) -> f64 {
+        match self.articulation.kind {
+            JointKind::Revolute => 6.0,
+            JointKind::Prismatic => 2.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cube(center: Point, half: f64) -> OrientedBox {
+        OrientedBox { center, half: Vector::repeat(half), rotation: Matrix3::identity() }
+    }
+
+    #[test]
+    fn iou_of_half_overlapping_cubes_is_a_third() {
+        let a = cube(Point::origin(), 0.5);
+        let b = cube(Point::new(0.5, 0.0, 0.0), 0.5);
+        assert!((box_iou(&a, &b) - 1.0 / 3.0).abs() < 0.02);
+        assert!((box_iou(&a, &a) - 1.0).abs() < 1e-9);
+        assert_eq!(box_iou(&a, &cube(Point::new(9.0, 0.0, 0.0), 0.5)), 0.0);
+    }
+
+    #[test]
+    fn two_half_boxes_weigh_like_the_whole() {
+        let solid = |center: Point, half: Vector| Solid {
+            name: String::new(),
+            role: Role::Front,
+            shape: OrientedBox { center, half, rotation: Matrix3::identity() },
+            seen: true,
+        };
+        let whole = mass_properties(&[solid(Point::origin(), Vector::new(0.4, 0.1, 0.3))], 700.0).unwrap();
+        let halves = mass_properties(
+            &[
+                solid(Point::new(-0.2, 0.0, 0.0), Vector::new(0.2, 0.1, 0.3)),
+                solid(Point::new(0.2, 0.0, 0.0), Vector::new(0.2, 0.1, 0.3)),
+            ],
+            700.0,
+        )
+        .unwrap();
+        assert!((whole.mass - halves.mass).abs() < 1e-9 && (whole.inertia - halves.inertia).norm() < 1e-9);
+    }
+
+    #[test]
+    fn boxes_are_written_as_rows_and_read_back() {
+        let b = OrientedBox {
+            center: Point::new(1.0, 2.0, 3.0),
+            half: Vector::new(0.1, 0.2, 0.3),
+            rotation: *Rotation3::from_euler_angles(0.1, 0.2, 0.3).matrix(),
+        };
+        let text = serde_json::to_string(&b).unwrap();
+        let back: OrientedBox = serde_json::from_str(&text).unwrap();
+        assert!((back.rotation - b.rotation).norm() < 1e-12);
+        assert!(text.contains("\"R\":[[0.93"), "{text}");
+    }
+}
