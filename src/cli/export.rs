@@ -1,0 +1,60 @@
+//! `paws export`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::{Args, ValueEnum};
+
+use super::output::write_file;
+use super::{Answer, print, shown};
+use crate::recording::json;
+use crate::{export, twin::Twin};
+
+/// A file format.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// Robot description for ROS, PyBullet, Drake, Pinocchio
+    Urdf,
+    /// MuJoCo model
+    Mjcf,
+    /// Binary glTF 2.0
+    Gltf,
+}
+
+#[derive(Debug, Args)]
+pub struct ExportArgs {
+    /// A twin.json, or the folder that `paws twin` wrote
+    twin: PathBuf,
+    /// Formats, separated by commas
+    #[arg(long, value_delimiter = ',', default_value = "urdf,mjcf,gltf")]
+    format: Vec<Format>,
+    /// Folder for scene.urdf, scene.xml, scene.glb
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    out: PathBuf,
+}
+
+/// Reads a twin from its file or folder.
+pub fn read_twin(path: &Path) -> anyhow::Result<Twin> {
+    let file = if path.is_dir() { path.join("twin.json") } else { path.to_owned() };
+    Ok(json(&file)?)
+}
+
+pub fn run(args: &ExportArgs) -> anyhow::Result<Answer> {
+    let twin = read_twin(&args.twin)?;
+    // Every format is made before the first is written: nothing half-done is left behind.
+    let mut files: Vec<(&str, Vec<u8>)> = Vec::new();
+    for format in &args.format {
+        files.push(match format {
+            Format::Urdf => ("scene.urdf", export::urdf::write(&twin)?.into_bytes()),
+            Format::Mjcf => ("scene.xml", export::mjcf::write(&twin)?.into_bytes()),
+            Format::Gltf => ("scene.glb", export::gltf::write(&twin, &[])?),
+        });
+    }
+    std::fs::create_dir_all(&args.out).with_context(|| shown(&args.out))?;
+    for (name, bytes) in files {
+        let path = args.out.join(name);
+        write_file(&path, bytes)?;
+        print(&format!("{}\n", shown(&path)))?;
+    }
+    Ok(Answer::Yes)
+}

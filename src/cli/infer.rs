@@ -1,0 +1,115 @@
+//! `paws infer`: joints from recordings, or from a bare trajectory.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::bail;
+use clap::Args;
+
+use super::output::write_file;
+use super::progress::Steps;
+use super::{Answer, ConfigFile, print, shown};
+use crate::articulation::Outcome;
+use crate::config::Config;
+use crate::evaluation::Predictions;
+use crate::geometry::segments::Lsd;
+use crate::inference::bare;
+use crate::pipeline;
+use crate::recording::{Recording, trajectory};
+use crate::report::table::aligned;
+use crate::report::{files, words};
+
+#[derive(Debug, Args)]
+pub struct InferArgs {
+    /// Folders of recordings, or files of bare trajectories (x y z [qx qy qz qw], with or without a time stamp first)
+    #[arg(required = true)]
+    inputs: Vec<PathBuf>,
+    /// Write predictions (recordings) or joints (trajectories) as JSON to this file
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    config: ConfigFile,
+}
+
+pub fn run(args: &InferArgs) -> anyhow::Result<Answer> {
+    let config = args.config.read()?;
+    let (folders, trajectories): (Vec<&PathBuf>, Vec<&PathBuf>) = args.inputs.iter().partition(|p| !p.is_file());
+    if !folders.is_empty() && !trajectories.is_empty() {
+        bail!("give recordings (folders) or bare trajectories (files), not both at once");
+    }
+    if folders.is_empty() {
+        bare_trajectories(&trajectories, &config, args.out.as_deref())
+    } else {
+        recordings(&folders, &config, args.out.as_deref())
+    }
+}
+
+fn recordings(folders: &[&PathBuf], config: &Config, out: Option<&Path>) -> anyhow::Result<Answer> {
+    let mut all = Predictions::default();
+    let header = ["recording", "clip", "narration", "joint", "outcome"];
+    let mut rows = vec![header.map(str::to_owned).to_vec()];
+    // All are opened before the first is worked on: one that cannot be read is told at once.
+    let opened: Vec<Recording> = folders.iter().map(|f| Recording::open(f)).collect::<Result<_, _>>()?;
+    for recording in &opened {
+        let steps = Steps::new();
+        let reasoner = super::twin::reasoner(config);
+        let scene = pipeline::infer(recording, config, &Lsd, &reasoner, &|s, d, t| steps.report(s, d, t))?;
+        let twin = crate::fitting::fit(&scene, &recording.up(), &config.fitting);
+        steps.finish();
+        for c in &scene.clips {
+            let joint = scene.joints.iter().find(|j| j.clips.contains(&c.clip.clip));
+            rows.push(vec![
+                scene.recording.clone(),
+                c.clip.clip.clone(),
+                c.clip.narration.clone(),
+                joint.map_or("-".to_owned(), |j| j.id.clone()),
+                words::clip_reason(c),
+            ]);
+        }
+        all.predictions.extend(files::predictions(&scene, &twin).predictions);
+    }
+    print(&aligned(&rows))?;
+    if let Some(out) = out {
+        write_file(out, files::to_json(&all)?)?;
+        eprintln!("predictions: {}", shown(out));
+    }
+    let found = all.predictions.iter().any(|p| p.kind.is_some());
+    Ok(if found { Answer::Yes } else { Answer::No })
+}
+
+fn bare_trajectories(paths: &[&PathBuf], config: &Config, out: Option<&Path>) -> anyhow::Result<Answer> {
+    let header = ["trajectory", "type", "axis", "range", "residual", "other type's", "why"];
+    let mut rows = vec![header.map(str::to_owned).to_vec()];
+    let mut results = Vec::new();
+    let mut found = false;
+    for path in paths {
+        let outcome = bare::infer(&trajectory::read(path)?, &config.inference);
+        let mut row = vec![shown(path)];
+        match &outcome {
+            Outcome::Found(j) => {
+                found = true;
+                let a = j.joint.axis;
+                let doubt = if j.ambiguous { " (ambiguous)" } else { "" };
+                row.extend([
+                    format!("{}{doubt}", j.joint.kind.word()),
+                    format!("{:.3} {:.3} {:.3}", a.x, a.y, a.z),
+                    words::amount(j.joint.kind, j.range),
+                    words::centimetres(j.residual_m),
+                    j.other_residual_m.map_or("-".to_owned(), words::centimetres),
+                    j.reason.clone(),
+                ]);
+            }
+            Outcome::Abstained(reason) => {
+                row.extend(["-", "-", "-", "-", "-"].map(str::to_owned));
+                row.push(format!("abstained: {reason}"));
+            }
+        }
+        rows.push(row);
+        results.push(serde_json::json!({"file": shown(path), "outcome": outcome}));
+    }
+    print(&aligned(&rows))?;
+    if let Some(out) = out {
+        write_file(out, files::to_json(&results)?)?;
+        eprintln!("joints: {}", shown(out));
+    }
+    Ok(if found { Answer::Yes } else { Answer::No })
+}

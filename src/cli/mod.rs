@@ -1,0 +1,123 @@
+//! Arguments and subcommands: the only place that writes files and prints.
+
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command prints; the library does not")]
+
+mod config;
+mod demo;
+mod evaluate;
+mod export;
+mod infer;
+mod keep;
+mod output;
+mod progress;
+mod synth;
+mod twin;
+mod validate;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::config::Config;
+
+/// What a command answers, as an exit code: 0 done, 1 ran but the answer is no, 2 error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Answer {
+    /// Done.
+    Yes,
+    /// It ran, but a joint failed or nothing was found.
+    No,
+}
+
+#[derive(Debug, Parser)]
+#[command(
+    name = "paws",
+    version,
+    about = "From an egocentric recording of opened doors and drawers to a kitchen that simulates",
+    after_help = "Start with `paws demo`. A recording is a folder (docs/recording-format.md); \
+                  exit codes: 0 done, 1 ran but the answer is no, 2 error."
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Make a twin from an embedded example and say where to look
+    Demo(demo::DemoArgs),
+    /// Make a simulated, validated twin from a recording
+    Twin(twin::TwinArgs),
+    /// Infer joints from recordings, or from a bare trajectory
+    Infer(infer::InferArgs),
+    /// Write a twin as URDF, MJCF or glTF
+    Export(export::ExportArgs),
+    /// Simulate a twin's joints against its recorded hands
+    Validate(validate::ValidateArgs),
+    /// Compare predictions with the truth
+    Evaluate(evaluate::EvaluateArgs),
+    /// Write a recording of a synthetic kitchen with a known answer
+    Synth(synth::SynthArgs),
+    /// Print every parameter with its value, unit and source
+    Config(config::ConfigArgs),
+}
+
+/// Arguments of all commands that run steps of the pipeline.
+#[derive(Debug, Clone, Default, Args)]
+pub struct ConfigFile {
+    /// Parameters to change, as TOML (`paws config --toml` prints all of them)
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+}
+
+impl ConfigFile {
+    fn read(&self) -> crate::error::Result<Config> {
+        self.config.as_deref().map_or_else(|| Ok(Config::default()), Config::read)
+    }
+}
+
+/// Runs the command line.
+#[must_use]
+pub fn run() -> ExitCode {
+    let cli = Cli::parse();
+    let result = match cli.command {
+        Command::Demo(args) => demo::run(&args),
+        Command::Twin(args) => twin::run(&args),
+        Command::Infer(args) => infer::run(&args),
+        Command::Export(args) => export::run(&args),
+        Command::Validate(args) => validate::run(&args),
+        Command::Evaluate(args) => evaluate::run(&args),
+        Command::Synth(args) => synth::run(&args),
+        Command::Config(args) => config::run(&args),
+    };
+    match result {
+        Ok(Answer::Yes) => ExitCode::SUCCESS,
+        Ok(Answer::No) => ExitCode::from(1),
+        Err(error) => {
+            // A closed pipe (`paws config | head`) is the reader's choice.
+            if error
+                .chain()
+                .any(|e| e.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe))
+            {
+                return ExitCode::SUCCESS;
+            }
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// Prints to standard output; a closed pipe is an error that [`run`] takes for success.
+fn print(text: &str) -> anyhow::Result<()> {
+    use std::io::Write;
+    let mut out = std::io::stdout().lock();
+    out.write_all(text.as_bytes())?;
+    out.flush()?;
+    Ok(())
+}
+
+/// A path as it is told to people.
+fn shown(path: &Path) -> String {
+    path.display().to_string()
+}

@@ -1,0 +1,186 @@
+//! `paws twin`: the whole way.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::Args;
+
+use super::output::Output;
+use super::progress::Steps;
+use super::{Answer, ConfigFile, keep, print, shown};
+use crate::config::Config;
+use crate::geometry::segments::Lsd;
+use crate::hands::Trajectory;
+use crate::pipeline::{self, Scene};
+use crate::reasoning::Reasoner;
+use crate::reasoning::heuristic::Geometric;
+use crate::recording::Recording;
+use crate::report::page::FileNote;
+use crate::report::table::aligned;
+use crate::report::{files, page, words};
+use crate::twin::Twin;
+use crate::validation::{self, Validation, Verdict, verdict::Hands};
+use crate::{export, fitting};
+
+#[derive(Debug, Args)]
+pub struct TwinArgs {
+    /// The recording's folder
+    recording: PathBuf,
+    /// Folder for the twin
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    #[command(flatten)]
+    config: ConfigFile,
+    /// Keep every intermediate result (trajectories, voxels, lines, candidates, marked images) in DIR/steps
+    #[arg(long)]
+    keep: bool,
+}
+
+const FILES: [FileNote; 11] = [
+    FileNote { name: "scene.urdf", what: "the twin for ROS, PyBullet, Drake, Pinocchio, Isaac" },
+    FileNote { name: "scene.xml", what: "the twin for MuJoCo, with floor, light and keyframes" },
+    FileNote { name: "scene.glb", what: "the twin for viewers and game engines, with an animation per joint" },
+    FileNote { name: "index.html", what: "this page" },
+    FileNote { name: "articulations.json", what: "every joint and every clip with its evidence" },
+    FileNote { name: "predictions.json", what: "one row a clip, for `paws evaluate`" },
+    FileNote { name: "twin.json", what: "boxes, joints and masses: the model behind all formats" },
+    FileNote { name: "validation.json", what: "every replay: errors, forces, ranges, rivals" },
+    FileNote { name: "trajectories.json", what: "the recorded hands that belong to each joint" },
+    FileNote { name: "config.toml", what: "the parameters that were used" },
+    FileNote { name: "steps/", what: "intermediate results, with --keep" },
+];
+
+pub fn run(args: &TwinArgs) -> anyhow::Result<Answer> {
+    make(&args.recording, &args.out, &args.config.read()?, args.keep)
+}
+
+/// A joint's recorded hands, as `trajectories.json` has them.
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
+pub struct JointHands {
+    /// The joint.
+    pub joint: String,
+    /// Clip name and trajectory.
+    pub clips: Vec<(String, Trajectory)>,
+}
+
+/// Hands of each joint of a scene, in the twin's order.
+pub fn joint_hands(scene: &Scene, twin: &Twin) -> Vec<JointHands> {
+    twin.furniture
+        .iter()
+        .map(|f| JointHands {
+            joint: f.part.id.clone(),
+            clips: scene
+                .joints
+                .iter()
+                .filter(|j| j.id == f.part.id)
+                .flat_map(|j| &j.clips)
+                .filter_map(|name| scene.clips.iter().find(|c| c.clip.clip == *name))
+                .filter_map(|c| c.trajectory.clone().map(|t| (c.clip.clip.clone(), t)))
+                .collect(),
+        })
+        .collect()
+}
+
+/// Borrowed in the form that validation takes.
+pub fn as_hands(joints: &[JointHands]) -> Vec<Hands<'_>> {
+    joints.iter().map(|j| j.clips.iter().map(|(name, t)| (name.clone(), t)).collect()).collect()
+}
+
+/// The reasoner that needs no network.
+pub fn reasoner(config: &Config) -> Geometric {
+    Geometric { reasoning: config.reasoning.clone(), inference: config.inference.clone() }
+}
+
+pub fn make(recording: &Path, out: &Path, config: &Config, keep_steps: bool) -> anyhow::Result<Answer> {
+    let begin = Instant::now();
+    let recording = Recording::open(recording)?;
+    let output = Output::new(out)?;
+    let steps = Steps::new();
+    let reasoner = reasoner(config);
+    let scene = pipeline::infer(&recording, config, &Lsd, &reasoner, &|s, d, t| steps.report(s, d, t))?;
+    steps.report("fitting boxes", 0, 1);
+    let twin = fitting::fit(&scene, &recording.up(), &config.fitting);
+    steps.report("simulating", 0, 1);
+    let hands = joint_hands(&scene, &twin);
+    let validation = validation::validate(&twin, &as_hands(&hands), &recording.up(), &config.validation)?;
+    steps.report("writing", 0, 1);
+
+    let verdicts: Vec<(String, String)> =
+        validation.joints.iter().map(|j| (j.id.clone(), j.verdict.word().to_owned())).collect();
+    let glb = export::gltf::write(&twin, &verdicts)?;
+    output.write("scene.urdf", export::urdf::write(&twin)?)?;
+    output.write("scene.xml", export::mjcf::write(&twin)?)?;
+    output.write("scene.glb", &glb)?;
+    output.write("articulations.json", files::articulations(&scene, reasoner.name())?)?;
+    output.write("predictions.json", files::to_json(&files::predictions(&scene, &twin))?)?;
+    output.write("twin.json", files::to_json(&twin)?)?;
+    output.write("validation.json", files::to_json(&validation)?)?;
+    output.write("trajectories.json", files::to_json(&hands)?)?;
+    output.write("config.toml", config.to_toml())?;
+    let command = format!("paws twin {} --out {}", recording.name, shown(out));
+    let notes: Vec<FileNote> = FILES.iter().filter(|f| keep_steps || f.name != "steps/").cloned().collect();
+    output.write("index.html", page::render(&scene, &twin, &validation, &glb, &command, &notes)?)?;
+    if keep_steps {
+        keep::write(&recording, &scene, &twin, &output)?;
+    }
+    output.finish()?;
+    let times = steps.finish();
+
+    print(&summary(&scene, &twin, &validation))?;
+    let times: Vec<String> = times.iter().map(|(s, t)| format!("{s} {:.2} s", t.as_secs_f64())).collect();
+    eprintln!("{:.2} s ({})", begin.elapsed().as_secs_f64(), times.join(", "));
+    print(&format!(
+        "\nlook:  {}   (the scene in 3D, every verdict with its reason)\n",
+        shown(&out.join("index.html"))
+    ))?;
+    print(&format!(
+        "use:   {}   {}   {}\n",
+        shown(&out.join("scene.urdf")),
+        shown(&out.join("scene.xml")),
+        shown(&out.join("scene.glb"))
+    ))?;
+    let refuted = validation.joints.iter().any(|j| j.verdict == Verdict::Fail);
+    Ok(if refuted || twin.furniture.is_empty() { Answer::No } else { Answer::Yes })
+}
+
+/// The table that a person reads.
+pub fn summary(scene: &Scene, twin: &Twin, validation: &Validation) -> String {
+    let header = ["joint", "furniture", "type", "axis", "range", "clips", "tracking error", "peak force", "verdict"];
+    let mut rows = vec![header.map(str::to_owned).to_vec()];
+    let mut reasons = String::new();
+    for (f, check) in twin.furniture.iter().zip(&validation.joints) {
+        let joint = scene.joints.iter().find(|j| j.id == f.part.id);
+        let kind = f.part.joint.articulation.kind;
+        rows.push(vec![
+            f.part.id.clone(),
+            f.part.label.clone(),
+            kind.word().to_owned(),
+            words::axis(&f.part, joint.and_then(|j| j.face.as_ref())),
+            words::amount(kind, f.part.joint.upper),
+            joint.map_or(0, |j| j.clips.len()).to_string(),
+            words::centimetres(check.rms_m),
+            format!("{:.0} N", check.peak_force_n),
+            check.verdict.word().to_owned(),
+        ]);
+        if check.verdict != Verdict::Pass {
+            reasons += &format!("{}: {}, because {}\n", check.id, check.verdict.word(), check.reason);
+        }
+    }
+    let mut text = format!("{}\n\n", scene.recording);
+    if twin.furniture.is_empty() {
+        text += "no joint was found\n";
+    } else {
+        text += &aligned(&rows);
+    }
+    if !reasons.is_empty() {
+        text += &format!("\n{reasons}");
+    }
+    let abstained: Vec<&pipeline::ClipResult> = scene.clips.iter().filter(|c| c.joint.found().is_none()).collect();
+    if !abstained.is_empty() {
+        text += &format!("\n{} of {} clips without an answer:\n", abstained.len(), scene.clips.len());
+        for c in abstained {
+            text += &format!("  {}: {}\n", c.clip.clip, c.joint.reason().unwrap_or_default());
+        }
+    }
+    text
+}

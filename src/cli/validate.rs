@@ -1,0 +1,70 @@
+//! `paws validate`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::output::write_file;
+use super::twin::{JointHands, as_hands};
+use super::{Answer, ConfigFile, print};
+use crate::math::Vector;
+use crate::recording::json;
+use crate::report::table::aligned;
+use crate::report::{files, words};
+use crate::validation::{self, Verdict};
+
+#[derive(Debug, Args)]
+pub struct ValidateArgs {
+    /// The folder that `paws twin` wrote (twin.json and trajectories.json)
+    twin: PathBuf,
+    /// Write the report as JSON to this file
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    config: ConfigFile,
+}
+
+pub fn run(args: &ValidateArgs) -> anyhow::Result<Answer> {
+    let config = args.config.read()?;
+    let twin = super::export::read_twin(&args.twin)?;
+    // The same points that every exporter insists on: a broken twin is told before it is simulated.
+    crate::export::check(&twin)?;
+    let hands: Vec<JointHands> = json(&args.twin.join("trajectories.json"))?;
+    let in_order: Vec<JointHands> = twin
+        .furniture
+        .iter()
+        .map(|f| JointHands {
+            joint: f.part.id.clone(),
+            clips: hands.iter().filter(|h| h.joint == f.part.id).flat_map(|h| h.clips.clone()).collect(),
+        })
+        .collect();
+    let report = validation::validate(&twin, &as_hands(&in_order), &Vector::z(), &config.validation)?;
+    let header =
+        ["joint", "clip", "action", "tracking error", "largest", "peak force", "reached", "observed", "best rival"];
+    let mut rows = vec![header.map(str::to_owned).to_vec()];
+    let mut verdicts = String::new();
+    for (check, f) in report.joints.iter().zip(&twin.furniture) {
+        let kind = f.part.joint.articulation.kind;
+        for c in &check.clips {
+            rows.push(vec![
+                check.id.clone(),
+                c.clip.clone(),
+                format!("{:?}", c.action).to_lowercase(),
+                words::centimetres(c.replay.rms_m),
+                words::centimetres(c.replay.max_m),
+                format!("{:.0} N", c.replay.peak_force_n),
+                words::amount(kind, c.replay.reached[1] - c.replay.reached[0]),
+                words::amount(kind, c.observed_range),
+                c.rivals.first().map_or("-".to_owned(), |r| format!("{} {}", r.name, words::centimetres(r.rms_m))),
+            ]);
+        }
+        verdicts += &format!("{}: {}, {}\n", check.id, check.verdict.word(), check.reason);
+    }
+    print(&aligned(&rows))?;
+    print(&format!("\n{verdicts}"))?;
+    if let Some(out) = &args.out {
+        write_file(out, files::to_json(&report)?)?;
+    }
+    let refuted = report.joints.iter().any(|j| j.verdict == Verdict::Fail);
+    Ok(if refuted { Answer::No } else { Answer::Yes })
+}

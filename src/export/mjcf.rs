@@ -1,0 +1,221 @@
+//! MJCF through `quick-xml`, in the manner of MuJoCo Menagerie: defaults, sites, excludes, keyframes.
+
+use std::io::Cursor;
+
+use quick_xml::Writer;
+
+use super::{color, local_pose, material};
+use crate::articulation::JointKind;
+use crate::error::{Error, Result};
+use crate::math::Point;
+use crate::twin::{Role, Solid, Twin, mass_properties};
+
+type Xml = Writer<Cursor<Vec<u8>>>;
+
+fn list(values: &[f64]) -> String {
+    values.iter().map(f64::to_string).collect::<Vec<_>>().join(" ")
+}
+
+/// The twin as an MJCF model with floor, light and keyframes `closed` and `open`.
+///
+/// # Errors
+/// Where the twin cannot be a simulator's model (see [`super::check`]).
+pub fn write(twin: &Twin) -> Result<String> {
+    super::check(twin)?;
+    let mut xml = Writer::new_with_indent(Cursor::new(Vec::new()), b' ', 2);
+    model(&mut xml, twin).map_err(|e| Error::Export(format!("MJCF: {e}")))?;
+    let mut text = String::from_utf8(xml.into_inner().into_inner()).map_err(|e| Error::Export(format!("MJCF: {e}")))?;
+    text.push('\n');
+    Ok(text)
+}
+
+fn model(xml: &mut Xml, twin: &Twin) -> std::io::Result<()> {
+    xml.create_element("mujoco").with_attribute(("model", twin.name.as_str())).write_inner_content(|xml| {
+        xml.create_element("compiler").with_attributes([("angle", "radian"), ("autolimits", "true")]).write_empty()?;
+        xml.create_element("option").with_attribute(("integrator", "implicitfast")).write_empty()?;
+        xml.create_element("visual").write_inner_content(|xml| {
+            xml.create_element("headlight").with_attribute(("ambient", "0.4 0.4 0.4")).write_empty()?;
+            Ok(())
+        })?;
+        defaults(xml)?;
+        xml.create_element("asset").write_inner_content(|xml| {
+            for role in [Role::Front, Role::Handle, Role::Tray, Role::Carcass] {
+                xml.create_element("material")
+                    .with_attributes([("name", material(role)), ("rgba", list(&color(role)).as_str())])
+                    .write_empty()?;
+            }
+            Ok(())
+        })?;
+        worldbody(xml, twin)?;
+        xml.create_element("contact").write_inner_content(|xml| {
+            // MuJoCo keeps contacts between a body and a parent welded to the world: exactly a fixed cabinet.
+            for f in &twin.furniture {
+                xml.create_element("exclude")
+                    .with_attributes([("body1", f.name.as_str()), ("body2", body_name(&f.part.id).as_str())])
+                    .write_empty()?;
+            }
+            Ok(())
+        })?;
+        keyframes(xml, twin)
+    })?;
+    Ok(())
+}
+
+fn body_name(id: &str) -> String {
+    format!("{id}_link")
+}
+
+fn defaults(xml: &mut Xml) -> std::io::Result<()> {
+    xml.create_element("default").write_inner_content(|xml| {
+        for (class, attributes) in [
+            ("visual", [("group", "2"), ("contype", "0"), ("conaffinity", "0")].as_slice()),
+            ("collision", [("group", "3")].as_slice()),
+        ] {
+            xml.create_element("default").with_attribute(("class", class)).write_inner_content(|xml| {
+                xml.create_element("geom")
+                    .with_attribute(("type", "box"))
+                    .with_attributes(attributes.iter().copied())
+                    .write_empty()?;
+                Ok(())
+            })?;
+        }
+        for (class, kind) in [("hinge", "hinge"), ("slide", "slide")] {
+            xml.create_element("default").with_attribute(("class", class)).write_inner_content(|xml| {
+                xml.create_element("joint")
+                    .with_attributes([
+                        ("type", kind),
+                        ("limited", "true"),
+                        ("armature", "0.001"),
+                        ("solreflimit", "0.004 1"),
+                    ])
+                    .write_empty()?;
+                Ok(())
+            })?;
+        }
+        Ok(())
+    })?;
+    Ok(())
+}
+
+fn worldbody(xml: &mut Xml, twin: &Twin) -> std::io::Result<()> {
+    let corners: Vec<Point> = twin
+        .furniture
+        .iter()
+        .flat_map(|f| f.carcass.iter().chain(&f.part.solids))
+        .flat_map(|s| s.shape.corners())
+        .collect();
+    let low = corners.iter().map(|c| c.z).fold(f64::INFINITY, f64::min);
+    let high = corners.iter().map(|c| c.z).fold(f64::NEG_INFINITY, f64::max);
+    let middle = crate::math::centroid(&corners).unwrap_or(Point::origin());
+    // The recording does not tell the floor: just under the lowest board.
+    let floor = if low.is_finite() { low - 0.01 } else { 0.0 };
+    let top = if high.is_finite() { high + 2.0 } else { 3.0 };
+    xml.create_element("worldbody").write_inner_content(|xml| {
+        xml.create_element("light")
+            .with_attributes([("pos", list(&[middle.x, middle.y, top]).as_str()), ("dir", "0 0 -1")])
+            .write_empty()?;
+        xml.create_element("geom")
+            .with_attributes([
+                ("name", "floor"),
+                ("type", "plane"),
+                ("pos", list(&[middle.x, middle.y, floor]).as_str()),
+                ("size", "5 5 0.1"),
+                ("rgba", "0.55 0.55 0.55 1"),
+            ])
+            .write_empty()?;
+        for f in &twin.furniture {
+            xml.create_element("body").with_attribute(("name", f.name.as_str())).write_inner_content(|xml| {
+                inertial(xml, &f.carcass, &Point::origin(), twin.density_kg_per_m3)?;
+                geoms(xml, &f.carcass, &Point::origin())?;
+                part(xml, twin, f)
+            })?;
+        }
+        Ok(())
+    })?;
+    Ok(())
+}
+
+fn part(xml: &mut Xml, twin: &Twin, f: &crate::twin::Furniture) -> std::io::Result<()> {
+    let part = &f.part;
+    let phi = part.joint.articulation;
+    xml.create_element("body")
+        .with_attributes([("name", body_name(&part.id).as_str()), ("pos", list(phi.origin.coords.as_slice()).as_str())])
+        .write_inner_content(|xml| {
+            inertial(xml, &part.solids, &phi.origin, twin.density_kg_per_m3)?;
+            xml.create_element("joint")
+                .with_attributes([
+                    ("name", part.id.as_str()),
+                    ("class", if phi.kind == JointKind::Revolute { "hinge" } else { "slide" }),
+                    ("axis", list(phi.axis.as_slice()).as_str()),
+                    ("range", list(&[0.0, part.joint.upper]).as_str()),
+                    ("damping", part.joint.damping.to_string().as_str()),
+                    ("frictionloss", part.joint.friction.to_string().as_str()),
+                ])
+                .write_empty()?;
+            geoms(xml, &part.solids, &phi.origin)?;
+            xml.create_element("site")
+                .with_attributes([
+                    ("name", format!("{}_handle", part.id).as_str()),
+                    ("pos", list((part.handle - phi.origin).as_slice()).as_str()),
+                    ("size", "0.01"),
+                    ("group", "4"),
+                ])
+                .write_empty()?;
+            Ok(())
+        })?;
+    Ok(())
+}
+
+fn inertial(xml: &mut Xml, solids: &[Solid], origin: &Point, density: f64) -> std::io::Result<()> {
+    let Some(m) = mass_properties(solids, density) else { return Ok(()) };
+    let i = m.inertia;
+    let full = [i[(0, 0)], i[(1, 1)], i[(2, 2)], i[(0, 1)], i[(0, 2)], i[(1, 2)]];
+    xml.create_element("inertial")
+        .with_attributes([
+            ("pos", list((m.center - origin).as_slice()).as_str()),
+            ("mass", m.mass.to_string().as_str()),
+            ("fullinertia", list(&full).as_str()),
+        ])
+        .write_empty()?;
+    Ok(())
+}
+
+fn geoms(xml: &mut Xml, solids: &[Solid], origin: &Point) -> std::io::Result<()> {
+    for s in solids {
+        let pose = local_pose(&s.shape, origin);
+        let q = pose.rotation.quaternion();
+        let position = list(pose.translation.vector.as_slice());
+        let rotation = list(&[q.w, q.i, q.j, q.k]);
+        let size = list(s.shape.half.as_slice());
+        let visual = format!("{}_visual", s.name);
+        for (name, class) in [(visual.as_str(), "visual"), (s.name.as_str(), "collision")] {
+            let mut geom = xml.create_element("geom").with_attributes([
+                ("name", name),
+                ("class", class),
+                ("pos", position.as_str()),
+                ("quat", rotation.as_str()),
+                ("size", size.as_str()),
+            ]);
+            if class == "visual" {
+                geom = geom.with_attribute(("material", material(s.role)));
+            }
+            geom.write_empty()?;
+        }
+    }
+    Ok(())
+}
+
+fn keyframes(xml: &mut Xml, twin: &Twin) -> std::io::Result<()> {
+    let closed = vec![0.0; twin.furniture.len()];
+    let open: Vec<f64> = twin.furniture.iter().map(|f| f.part.joint.upper).collect();
+    if closed.is_empty() {
+        return Ok(());
+    }
+    xml.create_element("keyframe").write_inner_content(|xml| {
+        for (name, qpos) in [("closed", &closed), ("open", &open)] {
+            xml.create_element("key").with_attributes([("name", name), ("qpos", list(qpos).as_str())]).write_empty()?;
+        }
+        Ok(())
+    })?;
+    Ok(())
+}

@@ -1,0 +1,87 @@
+//! Joints in words for people.
+
+use crate::articulation::{JointKind, Outcome};
+use crate::geometry::Face;
+use crate::pipeline::ClipResult;
+use crate::twin::Part;
+
+/// An opening for people: degrees or centimetres.
+#[must_use]
+pub fn amount(kind: JointKind, opening: f64) -> String {
+    match kind {
+        JointKind::Revolute => format!("{:.0}°", opening.to_degrees()),
+        JointKind::Prismatic => centimetres(opening),
+    }
+}
+
+/// A length for people.
+#[must_use]
+pub fn centimetres(metres: f64) -> String {
+    if metres.abs() < 0.1 { format!("{:.1} cm", 100.0 * metres) } else { format!("{:.0} cm", 100.0 * metres) }
+}
+
+/// Where the axis is, seen by the person: "upright, on the left".
+#[must_use]
+pub fn axis(part: &Part, face: Option<&Face>) -> String {
+    let phi = part.joint.articulation;
+    let upright = phi.axis.z.abs() > 0.8;
+    let level = phi.axis.z.abs() < 0.2;
+    let tilt = if upright {
+        "upright"
+    } else if level {
+        "level"
+    } else {
+        "tilted"
+    };
+    let Some(face) = face else { return tilt.to_owned() };
+    match phi.kind {
+        JointKind::Prismatic => {
+            if phi.axis.dot(&face.normal) > 0.8 {
+                "straight out".to_owned()
+            } else {
+                format!("{tilt}, sideways")
+            }
+        }
+        JointKind::Revolute => {
+            let [right, up, _] = face.coordinates(&phi.origin);
+            let side = match (phi.axis.dot(&face.up).abs() > 0.7, right < 0.0, up < 0.0) {
+                (true, true, _) => "left",
+                (true, false, _) => "right",
+                (false, _, true) => "below",
+                (false, _, false) => "above",
+            };
+            format!("{tilt}, {side}")
+        }
+    }
+}
+
+/// What became of a clip, in words.
+#[must_use]
+pub fn clip_reason(clip: &ClipResult) -> String {
+    match &clip.joint {
+        Outcome::Abstained(reason) => reason.clone(),
+        Outcome::Found(j) => format!(
+            "{} ({:.0} % sure), axis from {}, moved {}, hand within {} of its path",
+            j.joint.kind.word(),
+            100.0 * j.type_probability,
+            source(j.source),
+            amount(j.joint.kind, j.observed_range),
+            centimetres(j.residual_m)
+        ),
+    }
+}
+
+/// Where an axis comes from.
+fn source(source: crate::geometry::AxisSource) -> &'static str {
+    use crate::geometry::AxisSource::{FaceAxis, FaceEdge, FaceNormal, HandArc, HandPath, Line, Manhattan, PartEdge};
+    match source {
+        Line => "a line seen in several views",
+        PartEdge => "an edge of the part that moved",
+        FaceEdge => "an edge of the face",
+        HandArc => "the arc of the hand",
+        FaceNormal => "the front's normal",
+        FaceAxis => "an axis of the front",
+        Manhattan => "the room's frame",
+        HandPath => "the path of the hand",
+    }
+}

@@ -1,0 +1,290 @@
+//! A person with a camera on the head who opens and closes parts of a kitchen.
+
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
+use rand::RngExt;
+use rand_pcg::Pcg64Mcg;
+
+use super::kitchen::{Kitchen, OpenPart, limb};
+use crate::articulation::{Action, JointKind};
+use crate::math::{Point, Pose, Vector};
+use crate::twin::OrientedBox;
+
+/// One frame as it really was.
+#[derive(Debug, Clone)]
+pub struct TrueFrame {
+    /// Seconds.
+    pub time_secs: f64,
+    /// Camera.
+    pub world_from_camera: Pose,
+    /// Opening of every part.
+    pub openings: Vec<f64>,
+    /// Boxes of hand and arm; empty where none is near.
+    pub hand: Vec<OrientedBox>,
+    /// Where the fingertips are, and the wrist.
+    pub grasp: Option<(Point, Point)>,
+    /// Whether the hand holds a part.
+    pub contact: bool,
+    /// No interaction: such frames get a normals file.
+    pub is_still: bool,
+}
+
+/// A narrated segment.
+#[derive(Debug, Clone)]
+pub struct TrueClip {
+    /// First and last frame as narrated.
+    pub span: [usize; 2],
+    /// First and last frame of reach, motion and withdrawal.
+    pub true_span: [usize; 2],
+    /// The part, if any.
+    pub part: Option<String>,
+    /// Opening or closing.
+    pub action: Option<Action>,
+    /// The words.
+    pub narration: String,
+    /// Verb.
+    pub verb: String,
+    /// Noun.
+    pub noun: String,
+}
+
+/// The whole take.
+#[derive(Debug, Clone, Default)]
+pub struct Take {
+    /// Frames in time order.
+    pub frames: Vec<TrueFrame>,
+    /// Clips.
+    pub clips: Vec<TrueClip>,
+}
+
+const FPS: f64 = 12.0;
+
+/// A camera at `eye` that looks at `target`, upright.
+#[must_use]
+pub fn look_at(eye: &Point, target: &Point) -> Pose {
+    let forward = crate::math::unit(&(target - eye)).unwrap_or_else(Vector::x);
+    let right = crate::math::unit(&forward.cross(&Vector::z())).unwrap_or_else(Vector::x);
+    let down = forward.cross(&right);
+    let matrix = Matrix3::from_columns(&[right, down, forward]);
+    Pose::from_parts(eye.coords.into(), UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix)))
+}
+
+/// Minimum-jerk progress.
+fn smooth_step(s: f64) -> f64 {
+    let s = s.clamp(0.0, 1.0);
+    s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s)
+}
+
+/// Plays a take: a look around, then each chosen part opened and closed, with a distractor in between.
+#[must_use]
+pub fn play(kitchen: &Kitchen, count: usize, rng: &mut Pcg64Mcg) -> Take {
+    let mut take = Take::default();
+    let mut openings = vec![0.0; kitchen.parts.len()];
+    let mut time = 0.0;
+    let floor = 0.0f64;
+    let base = kitchen
+        .parts
+        .iter()
+        .map(|p| p.bounds.center - Vector::z() * p.bounds.half.z)
+        .map(|p| p.z)
+        .fold(f64::INFINITY, f64::min)
+        - 0.1;
+    let eye_height = base + floor + rng.random_range(1.5..1.72);
+    // Every kind of part once before any kind twice.
+    let mut order: Vec<usize> = (0..kitchen.parts.len()).collect();
+    for i in (1..order.len()).rev() {
+        order.swap(i, rng.random_range(0..=i));
+    }
+    let mut chosen: Vec<usize> = Vec::new();
+    let kind = |i: usize| (kitchen.parts[i].noun, kitchen.parts[i].articulation.kind);
+    for round in 0..=count {
+        for &i in &order {
+            let same = chosen.iter().filter(|&&c| kind(c) == kind(i)).count();
+            if chosen.len() < count
+                && same <= round
+                && !chosen.contains(&i)
+                && same == chosen.iter().filter(|&&c| kind(c) == kind(i)).count().min(round)
+            {
+                chosen.push(i);
+            }
+        }
+    }
+
+    // The look around: each part that will be used, and its neighbours, from a few places.
+    for view in 0..18 {
+        let part = &kitchen.parts
+            [if view < 2 * chosen.len() { chosen[view % chosen.len()] } else { order[view % order.len()] }];
+        let side = kitchen.axes[0] * rng.random_range(-0.7..0.7);
+        let mut eye = part.handle + part.out * rng.random_range(0.9..1.6) + side;
+        eye.z = eye_height + rng.random_range(-0.1..0.1);
+        let target =
+            part.handle + kitchen.axes[0] * rng.random_range(-0.2..0.2) - Vector::z() * rng.random_range(0.0..0.25);
+        take.still(time, look_at(&eye, &target), &openings);
+        time += 0.5;
+    }
+    for (n, &index) in chosen.iter().enumerate() {
+        let part = &kitchen.parts[index];
+        let share = rng.random_range(0.6..0.95);
+        // People open a drawer or a dishwasher as far as they need, a door about as far as a right angle.
+        let target = (share * part.upper).min(1.5);
+        for action in [Action::Open, Action::Close] {
+            take.clip(part, index, action, target, eye_height, &kitchen.axes[0], &mut time, &mut openings, rng);
+            let last = take.frames.last().map(|f| f.world_from_camera);
+            for _ in 0..2 {
+                time += 0.4;
+                if let Some(pose) = last {
+                    take.still(time, pose, &openings);
+                }
+            }
+        }
+        if n == 0 {
+            let at = take.frames.len() - 1;
+            take.clips.push(TrueClip {
+                span: [at, at],
+                true_span: [at, at],
+                part: None,
+                action: None,
+                narration: "wash hands".to_owned(),
+                verb: "wash".to_owned(),
+                noun: "hands".to_owned(),
+            });
+        }
+    }
+    take
+}
+
+impl Take {
+    fn still(&mut self, time_secs: f64, world_from_camera: Pose, openings: &[f64]) {
+        self.frames.push(TrueFrame {
+            time_secs,
+            world_from_camera,
+            openings: openings.to_vec(),
+            hand: Vec::new(),
+            grasp: None,
+            contact: false,
+            is_still: true,
+        });
+    }
+
+    #[allow(clippy::too_many_arguments, reason = "one call, all of it state of the take")]
+    fn clip(
+        &mut self,
+        part: &OpenPart,
+        index: usize,
+        action: Action,
+        opened: f64,
+        eye_height: f64,
+        along: &Vector,
+        time: &mut f64,
+        openings: &mut [f64],
+        rng: &mut Pcg64Mcg,
+    ) {
+        let phi = part.articulation;
+        // Stand on the handle's far side of a hinge, out of the door's way; straight before a drawer.
+        let aside = match phi.kind {
+            JointKind::Revolute if phi.axis.z.abs() > 0.5 => {
+                let to_handle = crate::math::reject(&(part.handle - phi.origin), &phi.axis);
+                along * (0.25 * to_handle.dot(along).signum())
+            }
+            _ => along * rng.random_range(-0.25..0.25),
+        };
+        let distance = if phi.kind == JointKind::Prismatic || phi.axis.z.abs() < 0.5 { 0.85 } else { 0.65 };
+        let stand = part.handle + part.out * (distance + rng.random_range(0.0..0.15)) + aside;
+        let mut eye = stand;
+        eye.z = eye_height;
+        let shoulder = eye - Vector::z() * 0.28 + along * 0.15;
+        let slack =
+            Vector::new(rng.random_range(-0.01..0.01), rng.random_range(-0.01..0.01), rng.random_range(-0.01..0.01));
+
+        let seconds = rng.random_range(1.3..2.0);
+        let (reach, moving, leave) = (8, (seconds * FPS) as usize, 8);
+        let first = self.frames.len();
+        let (start, end) = match action {
+            Action::Open => (0.0, opened),
+            Action::Close => (opened, 0.0),
+        };
+        let rest = shoulder + part.out * -0.15 - Vector::z() * 0.25;
+        let total = reach + moving + leave;
+        for i in 0..total {
+            let progress = smooth_step((i as f64 - reach as f64) / moving as f64);
+            let opening = start + (end - start) * progress;
+            openings[index] = opening;
+            let held = phi.motion(opening) * (part.handle + slack);
+            let grasp = if i < reach {
+                rest + (held - rest) * smooth_step((i + 1) as f64 / reach as f64)
+            } else if i >= reach + moving {
+                held + (rest - held) * smooth_step((i + 1 - reach - moving) as f64 / leave as f64)
+            } else {
+                held
+            };
+            let contact = (reach..reach + moving).contains(&i);
+            // The person follows the handle with the eyes and gives way to what comes out.
+            let back = match phi.kind {
+                JointKind::Prismatic => opening,
+                JointKind::Revolute => 0.15 * opening,
+            };
+            let sway = Vector::new(0.01 * (1.7 * *time).sin(), 0.01 * (1.3 * *time).cos(), 0.005 * (2.1 * *time).sin());
+            let eye_now = eye + part.out * back + sway;
+            let gaze = held + (part.bounds.center - held) * 0.3;
+            let wrist = grasp + crate::math::unit(&(shoulder - grasp)).unwrap_or_else(Vector::z) * 0.16;
+            self.frames.push(TrueFrame {
+                time_secs: *time,
+                world_from_camera: look_at(&eye_now, &gaze),
+                openings: openings.to_vec(),
+                hand: vec![limb(&grasp, &wrist, 0.035), limb(&wrist, &shoulder, 0.04)],
+                grasp: Some((grasp, wrist)),
+                contact,
+                is_still: false,
+            });
+            *time += 1.0 / FPS;
+        }
+        let verb = if action == Action::Open { "open" } else { "close" };
+        self.clips.push(TrueClip {
+            span: [first + reach / 2, first + total - 1 - leave / 2],
+            true_span: [first, first + total - 1],
+            part: Some(part.id.clone()),
+            action: Some(action),
+            narration: format!("{verb} the {}", part.noun),
+            verb: verb.to_owned(),
+            noun: part.noun.to_owned(),
+        });
+    }
+}
+
+/// 21 joints in MANO/OpenPose order: wrist, then thumb to little finger, each from the palm to its tip. The mean of the
+/// thumb, index and middle tips is `grasp`.
+#[must_use]
+pub fn hand_joints(grasp: &Point, wrist: &Point) -> [Point; 21] {
+    let along = crate::math::unit(&(grasp - wrist)).unwrap_or_else(Vector::x);
+    let across = crate::math::any_orthogonal(&along);
+    // Fingers side by side; the three that grasp are centred on the grasp.
+    let offsets = [-0.02, 0.0, 0.02, 0.038, 0.055];
+    let mut joints = [*wrist; 21];
+    for (finger, offset) in offsets.iter().enumerate() {
+        let tip = grasp + across * *offset;
+        for joint in 0..4 {
+            joints[1 + 4 * finger + joint] = wrist + (tip - wrist) * (0.4 + 0.2 * joint as f64);
+        }
+    }
+    joints
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_three_tips_average_to_the_grasp() {
+        let (grasp, wrist) = (Point::new(1.0, 2.0, 3.0), Point::new(1.1, 2.1, 3.0));
+        let j = hand_joints(&grasp, &wrist);
+        let mean = (j[4].coords + j[8].coords + j[12].coords) / 3.0;
+        assert!((mean - grasp.coords).norm() < 1e-12);
+    }
+
+    #[test]
+    fn the_camera_looks_at_its_target_upright() {
+        let pose = look_at(&Point::new(1.0, 0.0, 1.6), &Point::new(0.0, 2.0, 0.8));
+        let local = pose.inverse() * Point::new(0.0, 2.0, 0.8);
+        assert!(local.x.abs() < 1e-12 && local.y.abs() < 1e-12 && local.z > 0.0);
+        assert!((pose.rotation * -Vector::y()).z > 0.5);
+    }
+}

@@ -1,0 +1,176 @@
+//! A ray caster for boxes: colour, depth, normals and classes.
+
+use image::codecs::jpeg::JpegEncoder;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
+
+use super::kitchen::Block;
+use crate::error::{Error, Result};
+use crate::math::{Pose, Vector};
+use crate::recording::Camera;
+
+/// One rendered frame, row-major.
+#[derive(Debug, Clone)]
+pub struct Picture {
+    /// Colour.
+    pub rgb: Vec<[u8; 3]>,
+    /// Depth along the optical axis, metres; 0 = nothing hit.
+    pub depth: Vec<f32>,
+    /// Unit normals in the camera frame, facing the camera; zero = nothing hit.
+    pub normals: Vec<[f32; 3]>,
+    /// Mask class.
+    pub classes: Vec<u8>,
+}
+
+/// Casts a ray through every pixel.
+#[must_use]
+pub fn cast(blocks: &[Block], world_from_camera: &Pose, camera: &Camera) -> Picture {
+    let count = camera.width * camera.height;
+    let mut picture = Picture {
+        rgb: vec![[225, 228, 232]; count],
+        depth: vec![0.0; count],
+        normals: vec![[0.0; 3]; count],
+        classes: vec![0; count],
+    };
+    let camera_from_world = world_from_camera.inverse();
+    // A ceiling lamp behind the person's shoulder, in the world.
+    let light = Vector::new(0.25, 0.35, 0.9).normalize();
+    for block in blocks {
+        // The box in the camera frame: rays start at the origin with z = 1, so their parameter is the depth.
+        let rotation = (camera_from_world.rotation.to_rotation_matrix().matrix() * block.shape.rotation).transpose();
+        let center = rotation * (camera_from_world * block.shape.center).coords;
+        let (x_range, y_range) = pixel_bounds(block, &camera_from_world, camera);
+        for y in y_range {
+            for x in x_range.clone() {
+                let ray = Vector::new((x as f64 - camera.cx) / camera.fx, (y as f64 - camera.cy) / camera.fy, 1.0);
+                let direction = rotation * ray;
+                let Some((z, axis)) = hit(&center, &direction, &block.shape.half) else { continue };
+                let i = y * camera.width + x;
+                if picture.depth[i] > 0.0 && z as f32 >= picture.depth[i] {
+                    continue;
+                }
+                let sign = -direction[axis].signum();
+                let mut local = Vector::zeros();
+                local[axis] = sign;
+                let normal = rotation.transpose() * local;
+                let world_normal = world_from_camera.rotation * normal;
+                let shade = 0.55 + 0.45 * world_normal.dot(&light).max(0.0) - 0.12 * (-world_normal.z).max(0.0);
+                picture.depth[i] = z as f32;
+                picture.normals[i] = [normal.x as f32, normal.y as f32, normal.z as f32];
+                picture.classes[i] = block.class;
+                picture.rgb[i] = block.color.map(|c| (f64::from(c) * shade).clamp(0.0, 255.0) as u8);
+            }
+        }
+    }
+    picture
+}
+
+/// Nearest positive ray parameter at which a ray from the origin enters a box at `center` (box axes), and the entered side.
+fn hit(center: &Vector, direction: &Vector, half: &Vector) -> Option<(f64, usize)> {
+    let (mut enter, mut leave, mut axis) = (0.02, f64::INFINITY, usize::MAX);
+    for k in 0..3 {
+        let d = direction[k];
+        if d.abs() < 1e-12 {
+            if center[k].abs() > half[k] {
+                return None;
+            }
+            continue;
+        }
+        let (a, b) = ((center[k] - half[k]) / d, (center[k] + half[k]) / d);
+        let (near, far) = if a < b { (a, b) } else { (b, a) };
+        if near > enter {
+            (enter, axis) = (near, k);
+        }
+        leave = leave.min(far);
+        if enter > leave {
+            return None;
+        }
+    }
+    (axis < 3).then_some((enter, axis))
+}
+
+/// Pixels that a box may cover: all of them where it reaches behind the camera.
+fn pixel_bounds(
+    block: &Block,
+    camera_from_world: &Pose,
+    camera: &Camera,
+) -> (std::ops::Range<usize>, std::ops::Range<usize>) {
+    let all = (0..camera.width, 0..camera.height);
+    let corners = block.shape.corners().map(|c| camera_from_world * c);
+    if corners.iter().all(|c| c.z < 0.02) {
+        return (0..0, 0..0);
+    }
+    if corners.iter().any(|c| c.z < 0.05) {
+        return all;
+    }
+    let mut low = [f64::INFINITY; 2];
+    let mut high = [f64::NEG_INFINITY; 2];
+    for (u, v) in corners.iter().filter_map(|c| camera.project(c)) {
+        low = [low[0].min(u), low[1].min(v)];
+        high = [high[0].max(u), high[1].max(v)];
+    }
+    let range = |k: usize, size: usize| {
+        let from = low[k].floor().clamp(0.0, size as f64) as usize;
+        let to = (high[k].ceil() + 1.0).clamp(0.0, size as f64) as usize;
+        from..to.max(from)
+    };
+    (range(0, camera.width), range(1, camera.height))
+}
+
+/// The files of a frame: (name, bytes).
+///
+/// # Errors
+/// Where an image cannot be encoded, which would be a bug.
+pub fn encode(picture: &Picture, camera: &Camera, frame: usize, with_normals: bool) -> Result<Vec<(String, Vec<u8>)>> {
+    let (w, h) = (camera.width as u32, camera.height as u32);
+    let fail = |e: image::ImageError| Error::Export(format!("frame {frame}: {e}"));
+    let mut files = Vec::new();
+    let mut jpeg = Vec::new();
+    let rgb: Vec<u8> = picture.rgb.iter().flatten().copied().collect();
+    JpegEncoder::new_with_quality(&mut jpeg, 90).write_image(&rgb, w, h, ExtendedColorType::Rgb8).map_err(fail)?;
+    files.push((format!("frames/{frame:06}.jpg"), jpeg));
+    let png = |data: &[u8], color: ExtendedColorType| -> Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive)
+            .write_image(data, w, h, color)
+            .map_err(fail)?;
+        Ok(bytes)
+    };
+    let depth: Vec<u8> =
+        picture.depth.iter().flat_map(|z| ((z * 1000.0).round().clamp(0.0, 65535.0) as u16).to_ne_bytes()).collect();
+    files.push((format!("depth/{frame:06}.png"), png(&depth, ExtendedColorType::L16)?));
+    files.push((format!("masks/{frame:06}.png"), png(&picture.classes, ExtendedColorType::L8)?));
+    if with_normals {
+        let normals: Vec<u8> = picture
+            .normals
+            .iter()
+            .flat_map(|n| if *n == [0.0; 3] { [0; 3] } else { n.map(|c| (c * 127.0 + 128.0).round() as u8) })
+            .collect();
+        files.push((format!("normals/{frame:06}.png"), png(&normals, ExtendedColorType::Rgb8)?));
+    }
+    Ok(files)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Point;
+    use crate::twin::OrientedBox;
+
+    #[test]
+    fn a_wall_two_metres_ahead_is_two_metres_deep_everywhere() {
+        let camera = Camera { width: 32, height: 24, fx: 20.0, fy: 20.0, cx: 15.5, cy: 11.5 };
+        let wall = Block {
+            shape: OrientedBox {
+                center: Point::new(0.0, 0.0, 2.5),
+                half: Vector::new(9.0, 9.0, 0.5),
+                rotation: nalgebra::Matrix3::identity(),
+            },
+            color: [100; 3],
+            class: 3,
+        };
+        let p = cast(&[wall], &Pose::identity(), &camera);
+        assert!(p.depth.iter().all(|z| (z - 2.0).abs() < 1e-6));
+        assert!(p.normals.iter().all(|n| n[2] < -0.999) && p.classes.iter().all(|c| *c == 3));
+    }
+}
