@@ -117,11 +117,11 @@ pub fn simulate(
     let mass: f64 = part.solids.iter().map(|s| s.shape.volume() * density).sum();
     // Critical damping of the hand on the mass it moves.
     let hand_damping = 2.0 * (config.hand_stiffness_n_per_m * mass.max(0.1)).sqrt();
-    let grip_local = drive.grip - origin;
+    let grip_local = Point::from(drive.grip - origin);
     let grip_now = |world: &PhysicsWorld, body: RigidBodyHandle| -> (Point, Vector) {
         let b = &world.bodies[body];
         let pose: nalgebra::Isometry3<f32> = (*b.position()).into();
-        let p = origin + pose.cast::<f64>() * grip_local;
+        let p = origin + (pose.cast::<f64>() * grip_local).coords;
         let v: nalgebra::Vector3<f32> = b.velocity_at_point(local(&p, &origin)).into();
         (p, v.cast::<f64>())
     };
