@@ -65,6 +65,8 @@ block! {
         restart_after: usize = 3, "samples", "ours";
         /// Use the detector's contact flags; false takes every sample of a clip.
         use_contact: bool = true, "-", "A.2";
+        /// Contact that begins inside a narration is followed beyond its bounds by at most this (0 = not at all).
+        widen_secs: f64 = 2.0, "s", "ours";
         /// Fewer samples in contact than this give no answer.
         min_samples: usize = 3, "samples", "ours";
     }
@@ -282,7 +284,7 @@ impl Config {
     fn check(&self) -> std::result::Result<(), String> {
         for row in self.rows() {
             let Ok(value) = row.value.parse::<f64>() else { continue };
-            let zero_is_fine = ["hands.restart_after", "localization.min_visible_share"];
+            let zero_is_fine = ["hands.restart_after", "hands.widen_secs", "localization.min_visible_share"];
             if !value.is_finite() || value < 0.0 || (value == 0.0 && !zero_is_fine.contains(&row.key.as_str())) {
                 return Err(format!("{} = {} must be a positive finite number ({})", row.key, row.value, row.unit));
             }

@@ -79,28 +79,34 @@ pub fn trajectory(
     reading: &Reading,
     config: &config::Hands,
 ) -> Outcome<Trajectory> {
-    let in_clip: Vec<&HandSample> =
-        recording.hands.iter().filter(|s| (clip.start_frame..=clip.end_frame).contains(&s.frame)).collect();
-    if in_clip.is_empty() {
-        return Outcome::Abstained("no hand was detected in the clip".to_owned());
-    }
+    let samples_of = |side: Side, from: usize, to: usize| -> Vec<&HandSample> {
+        recording.hands.iter().filter(|s| s.side == side && (from..=to).contains(&s.frame)).collect()
+    };
+    let [from, to] = widened(recording, clip, config.widen_secs);
+    let mut in_clip = 0;
     let best = [Side::Right, Side::Left]
         .into_iter()
         .map(|side| {
-            let samples: Vec<&HandSample> = in_clip.iter().copied().filter(|s| s.side == side).collect();
-            let (score, span) = if config.use_contact {
-                contact_span(&samples.iter().map(|s| s.contact).collect::<Vec<_>>())
-            } else {
-                (samples.len(), 0..samples.len())
-            };
-            (score, side, samples[span].to_vec())
+            let samples = samples_of(side, clip.start_frame, clip.end_frame);
+            in_clip += samples.len();
+            if !config.use_contact {
+                return (samples.len(), side, samples);
+            }
+            let (score, span) = contact_span(&flags(&samples));
+            let seed = samples[span].iter().map(|s| s.frame);
+            let (first, last) = (seed.clone().min().unwrap_or(0), seed.max().unwrap_or(0));
+            let around = samples_of(side, from, to);
+            let held = if score == 0 { Vec::new() } else { grown(recording, &around, first, last) };
+            (score, side, held)
         })
         .max_by_key(|(score, side, _)| (*score, *side == Side::Right));
+    if in_clip == 0 {
+        return Outcome::Abstained("no hand was detected in the clip".to_owned());
+    }
     let Some((_, side, held)) = best.filter(|(_, _, held)| held.len() >= config.min_samples) else {
         return Outcome::Abstained(format!(
-            "fewer than {} hand samples in contact ({} hand samples in the clip)",
-            config.min_samples,
-            in_clip.len()
+            "fewer than {} hand samples in contact ({in_clip} hand samples in the clip)",
+            config.min_samples
         ));
     };
     let times: Vec<f64> = held.iter().map(|s| recording.frames[s.frame].timestamp_secs).collect();
@@ -132,6 +138,62 @@ pub fn filter(config: &config::Hands) -> Filter {
         gate,
         restart_after: config.restart_after,
     }
+}
+
+fn flags(samples: &[&HandSample]) -> Vec<bool> {
+    samples.iter().map(|s| s.contact).collect()
+}
+
+/// The clip's bounds moved outward by at most `secs`, without entering another narrated interaction.
+fn widened(recording: &Recording, clip: &Clip, secs: f64) -> [usize; 2] {
+    let time = |f: usize| recording.frames.get(f).map_or(0.0, |x| x.timestamp_secs);
+    let others: Vec<&Clip> =
+        recording.clips.iter().filter(|c| c.clip != clip.clip && c.end_frame > c.start_frame).collect();
+    let floor = others.iter().filter(|c| c.start_frame < clip.start_frame).map(|c| c.end_frame + 1).max().unwrap_or(0);
+    let ceiling = others
+        .iter()
+        .filter(|c| c.end_frame > clip.end_frame)
+        .map(|c| c.start_frame.saturating_sub(1))
+        .min()
+        .unwrap_or(recording.frames.len().saturating_sub(1));
+    let first = (floor.min(clip.start_frame)..=clip.start_frame)
+        .find(|&f| time(clip.start_frame) - time(f) <= secs)
+        .unwrap_or(clip.start_frame);
+    let last = (clip.end_frame..=ceiling.max(clip.end_frame))
+        .rev()
+        .find(|&f| time(f) - time(clip.end_frame) <= secs)
+        .unwrap_or(clip.end_frame);
+    [first, last]
+}
+
+/// A stretch of contact that began inside the narration goes on as long as the flags say so: narrations are shifted by
+/// about a second. Each side takes the extension of the largest sum (+1 in contact, -1 not), and stops at a gap.
+fn grown<'a>(recording: &Recording, around: &[&'a HandSample], first: usize, last: usize) -> Vec<&'a HandSample> {
+    // A hand that is not seen for longer may have let go.
+    const GAP_SECS: f64 = 0.5;
+    let time = |s: &HandSample| recording.frames[s.frame].timestamp_secs;
+    let (Some(start), Some(end)) =
+        (around.iter().position(|s| s.frame >= first), around.iter().rposition(|s| s.frame <= last))
+    else {
+        return Vec::new();
+    };
+    let reach = |order: &mut dyn Iterator<Item = usize>, from: usize| -> usize {
+        let (mut best, mut best_sum, mut sum, mut last) = (from, 0i64, 0i64, from);
+        for i in order {
+            if (time(around[i]) - time(around[last])).abs() > GAP_SECS {
+                break;
+            }
+            sum += if around[i].contact { 1 } else { -1 };
+            if sum > best_sum {
+                (best, best_sum) = (i, sum);
+            }
+            last = i;
+        }
+        best
+    };
+    let low = reach(&mut (0..start).rev(), start);
+    let high = reach(&mut (end + 1..around.len()), end);
+    around[low..=high.max(low)].to_vec()
 }
 
 /// The one stretch of contact that explains noisy flags best, and its score.
