@@ -98,6 +98,8 @@ block! {
 block! {
     /// Lines and directions (§3.2, §A.4, §A.5, algorithm 1).
     Geometry, "geometry", {
+        /// Surface points kept of each global view.
+        points_per_view: usize = 20000, "-", "ours";
         /// Shorter 2D segments are dropped.
         min_segment_px: f64 = 25.0, "px", "ours";
         /// Depth samples along a 2D segment.

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use crate::articulation::{Articulation, Outcome};
 use crate::config::Config;
 use crate::error::{Error, Result};
-use crate::geometry::moved::{self, Rect, View};
-use crate::geometry::segments::{LiftedSegment, LineDetector, lift_view};
+use crate::geometry::moved::{self, Rect};
+use crate::geometry::segments::{LiftedSegment, LineDetector, ViewGeometry, lift_view};
 use crate::geometry::{AxisCandidate, Face, LineTrack, ManhattanFrame, candidates, face, manhattan, tracks};
 use crate::hands::{self, Trajectory};
 use crate::inference::{self, ClipJoint, aggregate};
@@ -118,12 +118,12 @@ pub fn infer(
     wanted.sort_unstable();
     wanted.dedup();
     counter.store(0, std::sync::atomic::Ordering::Relaxed);
-    let lifted: BTreeMap<usize, Vec<LiftedSegment>> = wanted
+    let lifted: BTreeMap<usize, ViewGeometry> = wanted
         .par_iter()
         .map(|&view| {
-            let segments = lift_view(recording, view, detector, &config.geometry, config.seed)?;
+            let geometry = lift_view(recording, view, detector, &config.geometry, config.seed)?;
             tick("finding lines", wanted.len());
-            Ok((view, segments))
+            Ok((view, geometry))
         })
         .collect::<Result<_>>()?;
     let room = manhattan::estimate(recording, &with_normals_first(recording, &wanted), &config.geometry)?;
@@ -223,7 +223,7 @@ fn infer_clip(
     recording: &Recording,
     clip: &Clip,
     located: Located,
-    lifted: &BTreeMap<usize, Vec<LiftedSegment>>,
+    lifted: &BTreeMap<usize, ViewGeometry>,
     room: Option<&ManhattanFrame>,
     reasoner: &dyn Reasoner,
     config: &Config,
@@ -242,15 +242,24 @@ fn infer_clip(
     };
     let (Some(trajectory), Some(region)) = (&result.trajectory, &result.region) else { return Ok(result) };
 
-    let in_views: Vec<&LiftedSegment> = result.views.iter().filter_map(|v| lifted.get(v)).flatten().collect();
+    let in_views: Vec<&LiftedSegment> =
+        result.views.iter().filter_map(|v| lifted.get(v)).flat_map(|g| &g.segments).collect();
     result.lines = tracks::build(&in_views, region, &config.geometry, config.seed);
-    result.face = face::fit(region, room, &recording.up(), &config.geometry, config.seed);
+    let surface = surface(region, &result.views, lifted, config.localization.reach_m);
+    let around = face::Surroundings {
+        surface: &surface,
+        grips: [region.grip, trajectory.open_grip()],
+        viewpoint: region.viewpoint,
+        manhattan: room,
+        up: recording.up(),
+    };
+    result.face = face::fit(&around, &config.geometry, config.seed);
 
     let path = trajectory.positions();
     let open = moved::open_views(recording, clip, trajectory)?;
-    let closed = load_views(recording, &region.local_frames)?;
+    let stops = result.face.as_ref().map_or_else(Vec::new, |f| edges_on(f, &result.lines));
     if let Some(face) = &result.face {
-        result.part = moved::vote(face, &closed, &open, None, &config.fitting).moving_rect();
+        result.part = moved::vote(face, &surface, &open, None, &config.fitting).moving_rect(&stops);
     }
     result.candidates = candidates::collect(
         &candidates::Evidence {
@@ -291,19 +300,43 @@ fn infer_clip(
     );
     // With the joint known, the part is also seen where the joint puts it: the rectangle again, from all evidence.
     if let (Some(face), Outcome::Found(joint)) = (&result.face, &result.joint) {
-        let votes = moved::vote(face, &closed, &open, Some((&joint.joint, &region.grip)), &config.fitting);
-        result.part = votes.moving_rect().or(result.part);
+        let votes = moved::vote(face, &surface, &open, Some((&joint.joint, &region.grip)), &config.fitting);
+        result.part = votes.moving_rect(&stops).or(result.part);
     }
     result.answer = Some(answer);
     Ok(result)
 }
 
-fn load_views(recording: &Recording, frames: &[usize]) -> Result<Vec<View>> {
-    let mut views = Vec::new();
-    for &frame in frames {
-        views.extend(View::load(recording, frame, None)?);
+/// Points of the touched furniture: of the local frames, and of the global views where masks tell what belongs to it.
+fn surface(region: &Region, views: &[usize], lifted: &BTreeMap<usize, ViewGeometry>, reach_m: f64) -> Vec<Point> {
+    let mut points = region.points.clone();
+    let of_class = |class: u8| region.class.is_none_or(|c| c == class);
+    for geometry in views.iter().filter_map(|v| lifted.get(v)) {
+        let here = geometry.points.iter().filter(|(p, c)| of_class(*c) && (p - region.grip).norm() <= reach_m);
+        points.extend(here.map(|(p, _)| *p));
     }
-    Ok(views)
+    points
+}
+
+/// Lines on a face that run along one of its axes, as [`moved::CellVotes::moving_rect`] takes them.
+fn edges_on(face: &Face, lines: &[LineTrack]) -> Vec<(usize, f64, [f64; 2])> {
+    lines
+        .iter()
+        .filter_map(|line| {
+            let [a, b] = line.segment.ends().map(|p| face.coordinates(&p));
+            let near = a[2].abs() < 0.05 && b[2].abs() < 0.05;
+            let along = line.segment.line.direction;
+            let upright = along.dot(&face.up).abs() > 0.98;
+            let level = along.dot(&face.right).abs() > 0.98;
+            if !near || !(upright || level) {
+                return None;
+            }
+            // An upright line bounds the part to the right or left, a level one above or below.
+            let (axis, other) = if upright { (0, 1) } else { (1, 0) };
+            let span = [a[other].min(b[other]), a[other].max(b[other])];
+            Some((axis, 0.5 * (a[axis] + b[axis]), span))
+        })
+        .collect()
 }
 
 /// The grip is the origin of the face's coordinates.

@@ -4,7 +4,6 @@ use serde::{Deserialize, Serialize};
 
 use super::manhattan::ManhattanFrame;
 use crate::config;
-use crate::localization::Region;
 use crate::math::plane::Plane;
 use crate::math::ransac::{Search, lo_ransac};
 use crate::math::stats::quantile;
@@ -52,41 +51,56 @@ impl Face {
 /// Points this near to the grip vote for the face's plane.
 const NEIGHBOURHOOD_M: f64 = 0.45;
 
+/// What is known about the touched furniture before its face is.
+#[derive(Debug, Clone, Copy)]
+pub struct Surroundings<'a> {
+    /// Points of the touched furniture from local and global views, world.
+    pub surface: &'a [Point],
+    /// The grip at the closed and at the open end of the motion.
+    pub grips: [Point; 2],
+    /// Where the person stands.
+    pub viewpoint: Point,
+    /// The room's frame.
+    pub manhattan: Option<&'a ManhattanFrame>,
+    /// The world's up direction.
+    pub up: Vector,
+}
+
 /// Fits the face that the grip stands off, oriented to the viewpoint. `None` where no plane is near the grip.
+///
+/// A plane is the better a face the more of the surroundings lie on it, the better the grip stands off it as hands hold
+/// handles, the more the motion leaves it, and the nearer it is to upright or level and to the room's directions.
 #[must_use]
-pub fn fit(
-    region: &Region,
-    manhattan: Option<&ManhattanFrame>,
-    world_up: &Vector,
-    config: &config::Geometry,
-    seed: u64,
-) -> Option<Face> {
-    let near: Vec<Point> =
-        region.points.iter().copied().filter(|p| (p - region.grip).norm() < NEIGHBOURHOOD_M).collect();
+pub fn fit(around: &Surroundings, config: &config::Geometry, seed: u64) -> Option<Face> {
+    let grip = around.grips[0];
+    let near: Vec<Point> = around.surface.iter().copied().filter(|p| (p - grip).norm() < NEIGHBOURHOOD_M).collect();
     // Every n-th point is enough for a plane, and keeps the cost independent of the image size.
     let near: Vec<Point> = near.iter().copied().step_by((near.len() / 3000).max(1)).collect();
     if near.len() < 30 {
         return None;
     }
     let tolerance = config.face_tolerance_m;
-    // How well a plane explains the surroundings, and how well the grip stands where hands hold handles.
-    let score = |plane: &Plane| {
-        let share = near.iter().filter(|p| plane.height(p).abs() <= tolerance).count() as f64 / near.len() as f64;
-        let standoff = (plane.height(&region.grip) - config.grip_standoff_m) / 0.05;
-        share * (0.15 + 0.85 * (-0.5 * standoff * standoff).exp())
-    };
+    let share =
+        |plane: &Plane| near.iter().filter(|p| plane.height(p).abs() <= tolerance).count() as f64 / near.len() as f64;
+    let score = |plane: &Plane| share(plane) * face_prior(plane, around, config);
     let refine = |plane: Plane| {
         let inliers: Vec<Point> = near.iter().copied().filter(|p| plane.height(p).abs() <= tolerance).collect();
-        Plane::fit(&inliers).map_or(plane, |p| p.facing(&region.viewpoint))
+        Plane::fit(&inliers).map_or(plane, |p| p.facing(&around.viewpoint))
     };
     let mut candidates: Vec<Plane> = Vec::new();
-    for axis in manhattan.iter().flat_map(|m| m.axes) {
-        let normal = if (region.viewpoint - region.grip).dot(&axis) < 0.0 { -axis } else { axis };
+    for axis in around.manhattan.iter().flat_map(|m| m.axes) {
+        let normal = if (around.viewpoint - grip).dot(&axis) < 0.0 { -axis } else { axis };
         let mut heights: Vec<f64> = near.iter().map(|p| normal.dot(&p.coords)).collect();
         heights.sort_by(f64::total_cmp);
-        let best = densest(&heights, 2.0 * tolerance).map(|offset| Plane { normal, offset });
-        candidates.extend(best);
-        candidates.extend(best.map(refine));
+        // The densest slab of all, and the densest where a handle's face would be.
+        let behind: Vec<f64> = {
+            let at = normal.dot(&grip.coords);
+            heights.iter().copied().filter(|h| (at - 0.12..at + 0.03).contains(h)).collect()
+        };
+        for offset in [densest(&heights, 2.0 * tolerance), densest(&behind, 2.0 * tolerance)].into_iter().flatten() {
+            let slab = Plane { normal, offset };
+            candidates.extend([slab, refine(slab)]);
+        }
     }
     // Furniture turned against the room, or no room frame at all: planes from the points themselves. Several rounds, each
     // without the points that the planes before it explained.
@@ -100,33 +114,56 @@ pub fn fit(
             |plane, i| plane.height(&left[i]),
         );
         let Some(found) = found else { break };
-        candidates.push(found.model.facing(&region.viewpoint));
+        candidates.push(found.model.facing(&around.viewpoint));
         left.retain(|p| found.model.height(p).abs() > 2.0 * tolerance);
         if left.len() < 30 {
             break;
         }
     }
     let plane = candidates.into_iter().max_by(|a, b| score(a).total_cmp(&score(b)))?;
-    let support = near.iter().filter(|p| plane.height(p).abs() <= tolerance).count() as f64 / near.len() as f64;
-    // A tenth of the neighbourhood on the plane by chance is easy; a face fills far more.
-    if support < 0.1 {
+    let support = share(&plane);
+    // A twentieth of the neighbourhood on a plane happens by chance; a face fills far more.
+    if support < 0.05 {
         return None;
     }
     let normal = plane.normal;
-    let up = face_up(&normal, world_up, &(region.viewpoint - region.grip));
+    let up = face_up(&normal, &around.up, &(around.viewpoint - grip));
     let right = up.cross(&normal);
-    let mut face = Face { center: plane.project(&region.grip), right, up, normal, extent: [[0.0; 2]; 2], support };
-    let on_face: Vec<[f64; 3]> = region
-        .points
+    let mut face = Face { center: plane.project(&grip), right, up, normal, extent: [[0.0; 2]; 2], support };
+    let on_face: Vec<[f64; 3]> = around
+        .surface
         .iter()
         .map(|p| face.coordinates(p))
         .filter(|c| c[2].abs() <= config.face_tolerance_m + 0.02)
         .collect();
     for axis in 0..2 {
         let values: Vec<f64> = on_face.iter().map(|c| c[axis]).collect();
-        face.extent[axis] = [quantile(&values, 0.02)?.min(0.0), quantile(&values, 0.98)?.max(0.0)];
+        face.extent[axis] = [quantile(&values, 0.01)?.min(0.0), quantile(&values, 0.99)?.max(0.0)];
     }
     Some(face)
+}
+
+/// How likely a plane is a front that opens, whatever the points say; 1 at best.
+fn face_prior(plane: &Plane, around: &Surroundings, config: &config::Geometry) -> f64 {
+    let [closed, open] = around.grips;
+    let standoff = (plane.height(&closed) - config.grip_standoff_m) / 0.05;
+    let held = 0.15 + 0.85 * (-0.5 * standoff * standoff).exp();
+    // What opens leaves its face: a drawer straight, a door by half of its chord or more. Sliding doors do not.
+    let travel = open - closed;
+    let leaves = if travel.norm() < 0.06 {
+        1.0
+    } else {
+        0.25 + 0.75 * (plane.normal.dot(&travel) / travel.norm()).clamp(0.0, 1.0)
+    };
+    // People stand before what they open, not beside it.
+    let towards = crate::math::unit(&(around.viewpoint - closed)).map_or(1.0, |d| plane.normal.dot(&d));
+    let seen = 0.3 + 0.7 * (towards / 0.5).clamp(0.0, 1.0);
+    let tilt = plane.normal.dot(&around.up).abs();
+    let upright = if !(0.15..=0.99).contains(&tilt) { 1.0 } else { 0.4 };
+    let in_room = around
+        .manhattan
+        .is_none_or(|m| m.axes.iter().any(|a| crate::math::unsigned_angle(a, &plane.normal) < 8f64.to_radians()));
+    held * leaves * seen * upright * if in_room { 1.0 } else { 0.7 }
 }
 
 /// Up within the face; on a lid, away from the person.
@@ -166,17 +203,14 @@ mod tests {
                 points.push(Point::new(a, b, 0.82));
             }
         }
-        let region = Region {
-            voxel_m: 0.05,
-            voxels: vec![],
-            min_views: 4,
-            points,
-            class: None,
-            local_frames: vec![],
+        let around = Surroundings {
+            surface: &points,
+            grips: [Point::new(0.05, -0.035, 0.7), Point::new(0.05, -0.3, 0.7)],
             viewpoint: Point::new(0.2, -0.8, 1.6),
-            grip: Point::new(0.05, -0.035, 0.7),
+            manhattan: None,
+            up: Vector::z(),
         };
-        let face = fit(&region, None, &Vector::z(), &config::Geometry::default(), 0).unwrap();
+        let face = fit(&around, &config::Geometry::default(), 0).unwrap();
         assert!((face.normal + Vector::y()).norm() < 1e-6, "{face:?}");
         assert!((face.right - Vector::x()).norm() < 1e-6 && (face.up - Vector::z()).norm() < 1e-6);
         assert!((face.coordinates(&Point::new(0.05, -0.035, 0.7))[2] - 0.035).abs() < 1e-9);

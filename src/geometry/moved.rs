@@ -35,7 +35,7 @@ pub struct CellVotes {
     origin: [f64; 2],
     columns: usize,
     rows: usize,
-    /// Seen on the closed plane while closed.
+    /// Surface points on the closed plane.
     closed: Vec<u16>,
     /// Seen on the closed plane while open.
     still: Vec<u16>,
@@ -147,12 +147,12 @@ fn tolerance(z: f64) -> f64 {
     0.025 + 0.02 * z
 }
 
-/// Votes of closed and open views over the face's visible extent (at most 1.2 m from the grip). With a `joint`, cells also
+/// Votes of the closed surface and the open views over the face's visible extent (at most 1.2 m from the grip). With a `joint`, cells also
 /// count as moved where the part is seen in its opened place.
 #[must_use]
 pub fn vote(
     face: &Face,
-    closed: &[View],
+    surface: &[Point],
     open: &[View],
     joint: Option<(&Articulation, &Point)>,
     config: &config::Fitting,
@@ -173,12 +173,17 @@ pub fn vote(
         still: vec![0; columns * rows],
         gone: vec![0; columns * rows],
     };
+    for p in surface {
+        let [right, up, out] = face.coordinates(p);
+        if let Some(i) = votes.index(right, up)
+            && out.abs() <= 0.04
+        {
+            votes.closed[i] = votes.closed[i].saturating_add(1);
+        }
+    }
     for i in 0..columns * rows {
         let [right, up] = votes.cell(i % columns, i / columns);
         let here = face.point(right, up, 0.0);
-        for view in closed {
-            votes.closed[i] += u16::from(view.gap(&here).is_some_and(|(gap, z)| gap.abs() <= tolerance(z)));
-        }
         for view in open {
             if let Some((gap, z)) = view.gap(&here) {
                 votes.still[i] += u16::from(gap.abs() <= tolerance(z));
@@ -200,14 +205,63 @@ pub fn vote(
 }
 
 impl CellVotes {
+    /// Cell of face coordinates; `None` outside.
+    fn index(&self, right: f64, up: f64) -> Option<usize> {
+        let column = ((right - self.origin[0]) / self.cell_m).floor();
+        let row = ((up - self.origin[1]) / self.cell_m).floor();
+        let inside = column >= 0.0 && row >= 0.0 && column < self.columns as f64 && row < self.rows as f64;
+        inside.then(|| row as usize * self.columns + column as usize)
+    }
+
     /// Centre of a cell in face coordinates.
     fn cell(&self, column: usize, row: usize) -> [f64; 2] {
         [self.origin[0] + (column as f64 + 0.5) * self.cell_m, self.origin[1] + (row as f64 + 0.5) * self.cell_m]
     }
 
     /// The rectangle of the connected piece of moved cells at the grip; `None` where nothing there is seen to move.
+    ///
+    /// Where no open view looked, the part goes on: over its closed face up to an edge (`stops`: lines on the face as
+    /// (0 = upright or 1 = level, offset, from, to) in face coordinates), up to what is seen to stay, or up to the face's end.
     #[must_use]
-    pub fn moving_rect(&self) -> Option<Rect> {
+    pub fn moving_rect(&self, stops: &[(usize, f64, [f64; 2])]) -> Option<Rect> {
+        let seen = self.seen_rect()?;
+        Some(self.grown(seen, stops))
+    }
+
+    /// Extends a rectangle side by side over cells that no open view saw.
+    fn grown(&self, rect: Rect, stops: &[(usize, f64, [f64; 2])]) -> Rect {
+        let mut bounds = rect.bounds;
+        for axis in [0, 1] {
+            let across = bounds[1 - axis];
+            let count = ((across[1] - across[0]) / self.cell_m).round().max(1.0) as usize;
+            for (side, sign) in [(0, -1.0), (1, 1.0)] {
+                loop {
+                    let edge = bounds[axis][side];
+                    let next = edge + sign * 0.5 * self.cell_m;
+                    let cells: Vec<usize> = (0..count)
+                        .filter_map(|k| {
+                            let along = across[0] + (k as f64 + 0.5) * self.cell_m;
+                            if axis == 0 { self.index(next, along) } else { self.index(along, next) }
+                        })
+                        .collect();
+                    // Half of the edge's length must be face, and next to nothing of it seen while open.
+                    let face = cells.iter().filter(|&&i| self.closed[i] > 0).count();
+                    let known = cells.iter().filter(|&&i| self.still[i] > 0).count();
+                    let stopped = stops.iter().any(|(a, offset, span)| {
+                        let covers = span[1].min(across[1]) - span[0].max(across[0]);
+                        *a == axis && (offset - edge).abs() <= self.cell_m && covers > 0.4 * (across[1] - across[0])
+                    });
+                    if stopped || 2 * face < count || 5 * known > count {
+                        break;
+                    }
+                    bounds[axis][side] += sign * self.cell_m;
+                }
+            }
+        }
+        Rect { bounds }
+    }
+
+    fn seen_rect(&self) -> Option<Rect> {
         // A front of 15 x 15 cm is the smallest drawer.
         const MIN_AREA_M2: f64 = 0.02;
         let moving: Vec<bool> =
@@ -297,11 +351,38 @@ mod tests {
             votes.gone[15 * columns + c] = 3;
         }
         votes.gone[2 * columns + 2] = 9;
-        let rect = votes.moving_rect().unwrap();
+        let rect = votes.moving_rect(&[]).unwrap();
         for (found, expected) in rect.bounds.iter().flatten().zip([-0.2, 0.2, -0.2, 0.2]) {
             assert!((found - expected).abs() < 1e-9, "{rect:?}");
         }
         votes.gone.fill(0);
-        assert!(votes.moving_rect().is_none());
+        assert!(votes.moving_rect(&[]).is_none());
+    }
+
+    #[test]
+    fn a_part_goes_on_where_nobody_looked_until_an_edge() {
+        let (columns, rows) = (40, 60);
+        let mut votes = CellVotes {
+            cell_m: 0.02,
+            origin: [-0.4, -0.3],
+            columns,
+            rows,
+            closed: vec![1; columns * rows],
+            still: vec![0; columns * rows],
+            gone: vec![0; columns * rows],
+        };
+        for r in 0..60 {
+            for c in 0..40 {
+                let inside = (10..30).contains(&c) && (5..25).contains(&r);
+                votes.gone[r * columns + c] = u16::from(inside) * 3;
+                // Beside and below it the furniture is seen to stay; nobody looked up.
+                votes.still[r * columns + c] = u16::from(!inside && r < 25) * 3;
+            }
+        }
+        let line = [(1, 0.54, [-0.5, 0.5])];
+        let rect = votes.moving_rect(&line).unwrap();
+        for (found, expected) in rect.bounds.iter().flatten().zip([-0.2, 0.2, -0.2, 0.54]) {
+            assert!((found - expected).abs() < 0.021, "{rect:?}");
+        }
     }
 }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::config;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::math::line::{Line, Segment};
 use crate::math::ransac::{Search, lo_ransac};
 use crate::math::{Point, centroid, principal_directions, unit};
@@ -59,19 +59,27 @@ pub struct LiftedSegment {
     pub samples: Vec<Point>,
 }
 
-/// All lifted segments of one frame; empty where the frame has no image or no depth.
+/// What one view tells about the static scene.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ViewGeometry {
+    /// Line segments in the world.
+    pub segments: Vec<LiftedSegment>,
+    /// Surface points, world, with their mask class (0 where there is no mask); hands left out.
+    pub points: Vec<(Point, u8)>,
+}
+
+/// Segments and surface points of one frame; nothing where the frame has no image or no depth.
 pub fn lift_view(
     recording: &Recording,
     frame: usize,
     detector: &dyn LineDetector,
     config: &config::Geometry,
     seed: u64,
-) -> Result<Vec<LiftedSegment>> {
-    let (Some(grey), Some(depth)) = (recording.grey(frame)?, recording.depth(frame)?) else { return Ok(Vec::new()) };
+) -> Result<ViewGeometry> {
+    let (Some(grey), Some(depth)) = (recording.grey(frame)?, recording.depth(frame)?) else {
+        return Ok(ViewGeometry::default());
+    };
     let mask = recording.mask(frame)?;
-    if recording.frames.get(frame).is_none() {
-        return Err(Error::Simulation(format!("frame {frame} is not in the recording")));
-    }
     let mut lifted = Vec::new();
     for image in detector.detect(&grey) {
         if image.length() < config.min_segment_px || on_hand(&image, mask.as_ref()) {
@@ -83,7 +91,30 @@ pub fn lift_view(
         let samples: Vec<Point> = samples.into_iter().filter(near).collect();
         lifted.push(LiftedSegment { view: frame, image, segment, samples });
     }
-    Ok(lifted)
+    Ok(ViewGeometry { segments: lifted, points: surface_points(recording, frame, &depth, mask.as_ref(), config) })
+}
+
+/// A regular sample of the view's depth.
+fn surface_points(
+    recording: &Recording,
+    frame: usize,
+    depth: &Grid<f32>,
+    mask: Option<&Grid<u8>>,
+    config: &config::Geometry,
+) -> Vec<(Point, u8)> {
+    let pose = &recording.frames[frame].world_from_camera;
+    let step = ((depth.data.len() as f64 / config.points_per_view as f64).sqrt().round() as usize).max(1);
+    let mut points = Vec::new();
+    for y in (step / 2..depth.height).step_by(step) {
+        for x in (step / 2..depth.width).step_by(step) {
+            let z = depth.data[y * depth.width + x];
+            let class = mask.map_or(0, |m| m.data[y * m.width + x]);
+            if z > 0.0 && z.is_finite() && class != HAND_CLASS {
+                points.push((pose * recording.camera.unproject(x as f64, y as f64, f64::from(z)), class));
+            }
+        }
+    }
+    points
 }
 
 /// Whether more than a fifth of a segment runs along or over a hand.
