@@ -9,8 +9,8 @@ use crate::config::Config;
 
 #[derive(Debug, Args)]
 pub struct DemoArgs {
-    /// Folder for the recording and its twin
-    #[arg(long, value_name = "DIR", default_value = "twin")]
+    /// Folder for the recording (kitchen/) and its twin (twin/)
+    #[arg(long, value_name = "DIR", default_value = "demo")]
     out: PathBuf,
 }
 
@@ -18,12 +18,9 @@ pub struct DemoArgs {
 const SEED: u64 = 7;
 
 pub fn run(args: &DemoArgs) -> anyhow::Result<Answer> {
-    let scratch = args.out.with_file_name(format!(
-        "{}-recording",
-        args.out.file_name().map_or_else(|| "twin".into(), |n| n.to_string_lossy().into_owned())
-    ));
-    eprintln!("rendering a recording of a kitchen into {} ...", scratch.display());
-    super::synth::write(&crate::synth::Options { seed: SEED, ..Default::default() }, &scratch)?;
+    let (recording, twin) = (args.out.join("kitchen"), args.out.join("twin"));
+    eprintln!("rendering a recording of a kitchen into {} ...", recording.display());
+    super::synth::write(&crate::synth::Options { seed: SEED, width: 480, ..Default::default() }, &recording)?;
     eprintln!("making its twin ...");
-    twin::make(&scratch, &args.out, &Config::default(), true)
+    twin::make(&recording, &twin, &Config::default(), true)
 }

@@ -10,7 +10,7 @@ use crate::geometry::Face;
 use crate::geometry::moved::Rect;
 use crate::math::{Point, Vector, any_orthogonal, unit, unsigned_angle};
 use crate::pipeline::{Scene, SceneJoint};
-use crate::twin::{Furniture, Joint, OrientedBox, Part, Role, Solid, Twin};
+use crate::twin::{Furniture, Joint, OrientedBox, Part, Role, Solid, Twin, mass_properties};
 
 /// Height of a handle's bar over its face, metres; and half the width of bar and posts.
 const HANDLE_STANDOFF_M: f64 = 0.035;
@@ -37,13 +37,13 @@ pub fn fit(scene: &Scene, up: &Vector, config: &config::Fitting) -> Twin {
     for (plan, (_, rect)) in plans.iter_mut().zip(rects) {
         plan.rect = rect;
     }
-    let mut furniture: Vec<Furniture> = plans.iter().map(|p| build(p, config.carcass_depth_m, config)).collect();
+    let mut furniture: Vec<Furniture> = plans.iter().map(|p| build(p, config.carcass_depth_m, up, config)).collect();
     // Carcasses behind faces that meet at a corner share space: the later one gets shallower until it does not.
     for i in 1..furniture.len() {
         let mut depth = config.carcass_depth_m;
         while overlap::any(&furniture[..i], &furniture[i]) && depth > 0.1 {
             depth -= 0.05;
-            furniture[i] = build(&plans[i], depth, config);
+            furniture[i] = build(&plans[i], depth, up, config);
         }
     }
     Twin { name: scene.recording.clone(), density_kg_per_m3: config.density_kg_per_m3, furniture }
@@ -132,7 +132,7 @@ fn face_box(face: &Face, bounds: [[f64; 2]; 3]) -> OrientedBox {
     }
 }
 
-fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
+fn build(plan: &Plan, depth: f64, up: &Vector, config: &config::Fitting) -> Furniture {
     let face = &plan.face;
     let id = &plan.joint.id;
     let gap = config.clearance_m;
@@ -186,6 +186,7 @@ fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
     } else {
         (config.hinge_damping, config.hinge_friction)
     };
+    let friction = friction.max(holding_torque(&plan.articulation, &solids, upper, up, config));
     let least = if slide { 0.01 } else { 0.02 };
     let bounds = bounds_of(&solids, face);
     let mut articulation = plan.articulation;
@@ -213,6 +214,22 @@ fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
             bounds,
         },
     }
+}
+
+/// Doors that gravity would swing (dishwashers, flaps, lids) have springs or lifters that hold them anywhere; here dry
+/// friction does: a tenth more than the largest torque of the part's weight. Zero for slides and upright hinges.
+fn holding_torque(joint: &Articulation, solids: &[Solid], upper: f64, up: &Vector, config: &config::Fitting) -> f64 {
+    const GRAVITY: f64 = 9.81;
+    let Some(mass) = mass_properties(solids, config.density_kg_per_m3) else { return 0.0 };
+    // A degree of tilt, which a world frame may have, is no design.
+    if joint.kind == JointKind::Prismatic || joint.axis.dot(up).abs() > 0.9 {
+        return 0.0;
+    }
+    let torque = (0..=16).map(|i| {
+        let center = joint.motion(upper * f64::from(i) / 16.0) * mass.center;
+        (center - joint.origin).cross(&(up * -(mass.mass * GRAVITY))).dot(&joint.axis).abs()
+    });
+    1.1 * torque.fold(0.0, f64::max)
 }
 
 /// A bar on two posts where the hand was; upright beside an upright hinge, level otherwise.
@@ -257,12 +274,6 @@ fn bounds_of(solids: &[Solid], face: &Face) -> OrientedBox {
         }
     }
     face_box(face, bounds)
-}
-
-/// Where the grip is on a part: its handle's bar.
-#[must_use]
-pub fn handle_point(part: &Part) -> Point {
-    part.handle
 }
 
 #[cfg(test)]

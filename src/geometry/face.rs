@@ -134,7 +134,7 @@ pub fn fit(around: &Surroundings, config: &config::Geometry, seed: u64) -> Optio
         .surface
         .iter()
         .map(|p| face.coordinates(p))
-        .filter(|c| c[2].abs() <= config.face_tolerance_m + 0.02)
+        .filter(|c| c[2].abs() <= 4.0 * config.face_tolerance_m)
         .collect();
     for axis in 0..2 {
         let values: Vec<f64> = on_face.iter().map(|c| c[axis]).collect();

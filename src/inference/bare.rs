@@ -67,9 +67,10 @@ pub fn infer(trajectory: &BareTrajectory, config: &config::Inference) -> Outcome
             if !bend {
                 (JointKind::Prismatic, false, "a line explains the points as well as a circle does".to_owned())
             } else if fit.radius > config.max_radius_m {
-                // A hook that slips on a sliding door bends its path, but no door is this wide.
+                // A hook that slips on a sliding door bends its path, but no door is this wide. Up to twice the widest
+                // door it could still be one, read badly.
                 let text = format!("the best circle has a radius of {:.2} m, wider than any door", fit.radius);
-                (JointKind::Prismatic, true, text)
+                (JointKind::Prismatic, fit.radius < 2.0 * config.max_radius_m, text)
             } else {
                 (JointKind::Revolute, false, format!("a circle of radius {:.2} m explains the points", fit.radius))
             }

@@ -48,7 +48,9 @@ impl Reasoner for Geometric {
         };
         let name = match question.reading.kind {
             Some(kind) => {
-                let odds = (self.reasoning.name_accuracy / (1.0 - self.reasoning.name_accuracy)).ln();
+                // A generic word is worth half of what a name is worth.
+                let strength = if question.reading.generic { 0.5 } else { 1.0 };
+                let odds = strength * (self.reasoning.name_accuracy / (1.0 - self.reasoning.name_accuracy)).ln();
                 if kind == JointKind::Revolute { odds } else { -odds }
             }
             None => 0.0,
@@ -164,7 +166,7 @@ mod tests {
         candidates: &[AxisCandidate],
         agreement: &[(f64, usize)],
     ) -> Answer {
-        let reading = Reading { moves_joint: Some(true), action: None, furniture: None, kind };
+        let reading = Reading { moves_joint: Some(true), action: None, furniture: None, kind, generic: false };
         Geometric { reasoning: config::Reasoning::default(), inference: config::Inference::default() }
             .answer(&Question { reading: &reading, path, grip: path[0], candidates, agreement, part: None })
     }

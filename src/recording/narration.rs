@@ -20,6 +20,7 @@ struct Lexicon {
     either: Vec<String>,
     hinge: Vec<String>,
     slide: Vec<String>,
+    generic: Vec<String>,
     handheld: Vec<String>,
 }
 
@@ -34,6 +35,8 @@ pub struct Reading {
     pub furniture: Option<String>,
     /// The motion type that the furniture's name suggests.
     pub kind: Option<JointKind>,
+    /// The name is a generic one ("door"), said of whatever opens.
+    pub generic: bool,
 }
 
 /// Reads a clip's narration, verb and noun.
@@ -43,7 +46,7 @@ pub fn read(clip: &Clip) -> Reading {
     let text: String = text.chars().map(|c| if c.is_alphanumeric() || c == '-' { c } else { ' ' }).collect();
     let text = format!(" {} ", text.split_whitespace().collect::<Vec<_>>().join(" "));
     if text.trim().is_empty() {
-        return Reading { moves_joint: None, action: None, furniture: None, kind: None };
+        return Reading { moves_joint: None, action: None, furniture: None, kind: None, generic: false };
     }
     let lexicon = &*LEXICON;
 
@@ -57,14 +60,15 @@ pub fn read(clip: &Clip) -> Reading {
     };
     let (hinge, slide) = (longest(&text, &lexicon.hinge), longest(&text, &lexicon.slide));
     // "the dishwasher drawer" slides, "the drawer door" does too: the slide's word is the rarer, so it decides.
-    let (furniture, kind) = match (hinge, slide) {
+    let generic = longest(&text, &lexicon.generic).filter(|_| hinge.is_none() && slide.is_none());
+    let (furniture, kind) = match (hinge.or(generic), slide) {
         (_, Some(w)) => (Some(w.clone()), Some(JointKind::Prismatic)),
         (Some(w), None) => (Some(w.clone()), Some(JointKind::Revolute)),
         (None, None) => (None, None),
     };
     let names_motion = open.is_some() || close.is_some() || longest(&text, &lexicon.either).is_some();
     let handheld = longest(&text, &lexicon.handheld).is_some() && furniture.is_none();
-    Reading { moves_joint: Some(names_motion && !handheld), action, furniture, kind }
+    Reading { moves_joint: Some(names_motion && !handheld), action, furniture, kind, generic: generic.is_some() }
 }
 
 /// The longest of the words (or phrases, or their plurals) that stand in the text.
