@@ -60,7 +60,7 @@ block! {
         /// Standard deviation of an observed fingertip mean.
         observation_std_m: f64 = 0.05, "m", "B.1";
         /// p-value of the chi-square gate with 3 degrees of freedom.
-        gate_p_value: f64 = 0.05, "-", "B.1";
+        gate_p_value: f64 = 0.05, "share", "B.1";
         /// Rejections in a row after which the filter starts again (0 = never).
         restart_after: usize = 3, "samples", "ours";
         /// Use the detector's contact flags; false takes every sample of a clip.
@@ -87,7 +87,7 @@ block! {
         /// Global views for the geometry.
         global_views: usize = 50, "views", "B.1";
         /// Share of the confident voxels that a global view must have inside its frustum.
-        min_visible_share: f64 = 0.3, "-", "ours";
+        min_visible_share: f64 = 0.3, "share", "ours";
         /// Only what lies within this distance of the hand can be the touched furniture.
         reach_m: f64 = 1.5, "m", "ours";
         /// Every n-th pixel of the local frames is used.
@@ -120,6 +120,8 @@ block! {
         normals_per_frame: usize = 2000, "-", "ours";
         /// Bandwidth of the mean shift over the frames' axes.
         mean_shift_deg: f64 = 12.0, "deg", "ours";
+        /// Refine the room's frame on all normals after the mean shift (the k-means of a noisy wall splits it).
+        refine_manhattan: bool = true, "-", "ours";
         /// Slab half-width that belongs to a front face.
         face_tolerance_m: f64 = 0.015, "m", "ours";
         /// A grip is about this far in front of its face.
@@ -133,7 +135,7 @@ block! {
         /// Lines offered to the reasoner per clip.
         candidates: usize = 4, "-", "B.1";
         /// How often the furniture's name tells the motion type rightly.
-        name_accuracy: f64 = 0.9, "-", "ours";
+        name_accuracy: f64 = 0.9, "share", "ours";
         /// Independent samples in one recorded motion: errors of neighbouring frames are correlated.
         effective_samples: f64 = 8.0, "-", "ours";
         /// Noise of a smoothed hand position when two explanations of it are compared.
@@ -145,7 +147,7 @@ block! {
     /// Trajectory and geometry to a joint (§3.4, §A.7, §C.2).
     Inference, "inference", {
         /// Tolerance of the torus test as a share of the mean radius.
-        torus_tolerance_ratio: f64 = 0.15, "-", "B.1";
+        torus_tolerance_ratio: f64 = 0.15, "share", "B.1";
         /// Least torus tolerance.
         torus_tolerance_min_m: f64 = 0.015, "m", "B.1";
         /// Largest torus tolerance.
@@ -157,7 +159,7 @@ block! {
         /// A hand point this near the slide's line is an inlier.
         prismatic_tolerance_m: f64 = 0.02, "m", "B.1";
         /// Least share of inliers of a slide, counted within the larger of the tolerance and twice the hand noise.
-        prismatic_min_inliers: f64 = 0.3, "-", "B.1";
+        prismatic_min_inliers: f64 = 0.3, "share", "B.1";
         /// Add the normal of the touched face to the Manhattan directions (furniture turned against the room).
         use_face_normal: bool = true, "-", "ours";
         /// Hinge directions within this angle of an axis of the face are set to it.
@@ -208,7 +210,7 @@ block! {
         /// of estimated hands.
         pass_rms_m: f64 = 0.05, "m", "ours";
         /// Share of the observed range that the simulated joint must reach.
-        pass_range_share: f64 = 0.8, "-", "ours";
+        pass_range_share: f64 = 0.8, "share", "ours";
         /// Rivals must be worse by this factor, or the recording cannot decide.
         rival_margin: f64 = 1.15, "-", "ours";
         /// Less opening than this cannot tell a hinge from a slide.
@@ -290,8 +292,7 @@ impl Config {
             if !value.is_finite() || value < 0.0 || (value == 0.0 && !zero_is_fine.contains(&row.key.as_str())) {
                 return Err(format!("{} = {} must be a positive finite number ({})", row.key, row.value, row.unit));
             }
-            let is_share = row.unit == "-" && row.value.contains('.') && row.key != "validation.rival_margin";
-            if is_share && value >= 1.0 {
+            if row.unit == "share" && value >= 1.0 {
                 return Err(format!("{} = {} must be below 1", row.key, row.value));
             }
         }

@@ -143,7 +143,7 @@ pub fn infer(
     Ok(Scene { recording: recording.name.clone(), manhattan: room, clips, joints })
 }
 
-/// Zero depth everywhere is an export gone wrong, not a scene; a few frames tell.
+/// Zero depth everywhere, or depth in another unit than the hands, is an export gone wrong, not a scene; a few frames tell.
 fn check_depth(recording: &Recording) -> Result<()> {
     let with_depth: Vec<usize> =
         (0..recording.frames.len()).filter(|&f| recording.frames[f].files.depth.is_some()).collect();
@@ -158,6 +158,31 @@ fn check_depth(recording: &Recording) -> Result<()> {
                 ],
             });
         }
+        return Ok(());
+    }
+    // Hands tell what depth should be where they are: a ratio far from 1 is a unit, not an error of estimation.
+    let mut ratios = Vec::new();
+    let mut any = false;
+    let with_hand: Vec<&crate::recording::HandSample> =
+        recording.hands.iter().filter(|h| recording.frames[h.frame].files.depth.is_some()).collect();
+    for i in 0..with_hand.len().min(8) {
+        let hand = with_hand[i * with_hand.len() / with_hand.len().min(8)];
+        let Some(depth) = recording.depth(hand.frame)? else { continue };
+        any |= depth.data.iter().any(|z| *z > 0.0);
+        let local = recording.frames[hand.frame].world_from_camera.inverse() * hand.grasp();
+        let seen = recording.camera.project(&local).and_then(|(u, v)| depth.nearest(u, v));
+        ratios.extend(seen.filter(|z| *z > 0.0).map(|z| f64::from(z) / local.z));
+    }
+    if let Some(ratio) = crate::math::stats::median(&ratios).filter(|r| !(0.2..8.0).contains(r)) {
+        return Err(Error::Recording {
+            path: recording.dir.clone(),
+            faults: vec![format!(
+                "depth: where hands are, depth is {ratio:.3} times their distance: hands and depth disagree on the unit; depth \
+                 must be 16-bit millimetres, hands metres"
+            )],
+        });
+    }
+    if any {
         return Ok(());
     }
     for i in 0..with_depth.len().min(8) {

@@ -9,7 +9,7 @@ use super::output::write_file;
 use super::{Answer, print};
 use crate::evaluation::summary::Shares;
 use crate::evaluation::{Predictions, Report, Truth, evaluate};
-use crate::report::files::to_json;
+use crate::json;
 use crate::report::table::aligned;
 use crate::report::words;
 
@@ -46,7 +46,7 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<Answer> {
     }
     print(&text(&report))?;
     if let Some(path) = &args.json {
-        write_file(path, to_json(&report)?)?;
+        write_file(path, json::text(&report)?)?;
     }
     Ok(Answer::Yes)
 }

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 
 use super::output::write_file;
 use super::{Answer, print, shown};
-use crate::recording::json;
+use crate::json;
 use crate::{export, twin::Twin};
 
 /// A file format.
@@ -36,7 +36,7 @@ pub struct ExportArgs {
 /// Reads a twin from its file or folder.
 pub fn read_twin(path: &Path) -> anyhow::Result<Twin> {
     let file = if path.is_dir() { path.join("twin.json") } else { path.to_owned() };
-    Ok(json(&file)?)
+    Ok(json::read(&file)?)
 }
 
 pub fn run(args: &ExportArgs) -> anyhow::Result<Answer> {

@@ -13,6 +13,7 @@ use crate::config::Config;
 use crate::evaluation::Predictions;
 use crate::geometry::segments::Lsd;
 use crate::inference::bare;
+use crate::json;
 use crate::pipeline;
 use crate::recording::{Recording, trajectory};
 use crate::report::table::aligned;
@@ -69,7 +70,7 @@ fn recordings(folders: &[&PathBuf], config: &Config, out: Option<&Path>) -> anyh
     }
     print(&aligned(&rows))?;
     if let Some(out) = out {
-        write_file(out, files::to_json(&all)?)?;
+        write_file(out, json::text(&all)?)?;
         eprintln!("predictions: {}", shown(out));
     }
     let found = all.predictions.iter().any(|p| p.kind.is_some());
@@ -108,7 +109,7 @@ fn bare_trajectories(paths: &[&PathBuf], config: &Config, out: Option<&Path>) ->
     }
     print(&aligned(&rows))?;
     if let Some(out) = out {
-        write_file(out, files::to_json(&results)?)?;
+        write_file(out, json::text(&results)?)?;
         eprintln!("joints: {}", shown(out));
     }
     Ok(if found { Answer::Yes } else { Answer::No })

@@ -6,16 +6,16 @@ use anyhow::Context;
 use image::{Rgb, RgbImage};
 
 use super::output::Output;
+use crate::json;
 use crate::math::Point;
 use crate::pipeline::{ClipResult, Scene};
 use crate::recording::{Camera, Recording};
-use crate::report::files::to_json;
 use crate::twin::Twin;
 
 pub fn write(recording: &Recording, scene: &Scene, twin: &Twin, output: &Output) -> anyhow::Result<()> {
     for clip in &scene.clips {
         let folder = format!("steps/{}", clip.clip.clip);
-        output.write(&format!("{folder}/clip.json"), to_json(clip)?)?;
+        output.write(&format!("{folder}/clip.json"), json::text(clip)?)?;
         if let Some(trajectory) = &clip.trajectory {
             let mut text = String::from("frame,time_secs,observed_x,observed_y,observed_z,x,y,z,accepted\n");
             for s in &trajectory.samples {

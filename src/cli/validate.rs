@@ -7,10 +7,10 @@ use clap::Args;
 use super::output::write_file;
 use super::twin::{JointHands, as_hands};
 use super::{Answer, ConfigFile, print};
+use crate::json;
 use crate::math::Vector;
-use crate::recording::json;
 use crate::report::table::aligned;
-use crate::report::{files, words};
+use crate::report::words;
 use crate::validation::{self, Verdict};
 
 #[derive(Debug, Args)]
@@ -29,7 +29,7 @@ pub fn run(args: &ValidateArgs) -> anyhow::Result<Answer> {
     let twin = super::export::read_twin(&args.twin)?;
     // The same points that every exporter insists on: a broken twin is told before it is simulated.
     crate::export::check(&twin)?;
-    let hands: Vec<JointHands> = json(&args.twin.join("trajectories.json"))?;
+    let hands: Vec<JointHands> = json::read(&args.twin.join("trajectories.json"))?;
     let in_order: Vec<JointHands> = twin
         .furniture
         .iter()
@@ -63,7 +63,7 @@ pub fn run(args: &ValidateArgs) -> anyhow::Result<Answer> {
     print(&aligned(&rows))?;
     print(&format!("\n{verdicts}"))?;
     if let Some(out) = &args.out {
-        write_file(out, files::to_json(&report)?)?;
+        write_file(out, json::text(&report)?)?;
     }
     let refuted = report.joints.iter().any(|j| j.verdict == Verdict::Fail);
     Ok(if refuted { Answer::No } else { Answer::Yes })

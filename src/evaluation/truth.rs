@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::articulation::JointKind;
 use crate::error::{Error, Result};
+use crate::json;
 use crate::math::{Point, Vector, unit};
-use crate::recording::json;
 use crate::twin::OrientedBox;
 
 /// All predictions of a file.
@@ -57,7 +57,7 @@ pub struct Prediction {
 impl Predictions {
     /// Reads a file and checks its rows.
     pub fn read(path: &Path) -> Result<Self> {
-        let mut all: Self = json(path)?;
+        let mut all: Self = json::read(path)?;
         for (i, p) in all.predictions.iter_mut().enumerate() {
             let place = format!("predictions[{i}] ({}/{})", p.recording, p.clip);
             if p.kind.is_none() {
@@ -140,8 +140,8 @@ impl Truth {
         } else {
             (path.parent().unwrap_or(Path::new(".")).to_owned(), path.to_owned())
         };
-        let truth: TruthFile = json(&file)?;
-        let names: ClipNames = json(&dir.join("clips.json"))?;
+        let truth: TruthFile = json::read(&file)?;
+        let names: ClipNames = json::read(&dir.join("clips.json"))?;
         let recording = dir
             .canonicalize()
             .ok()

@@ -28,7 +28,7 @@ struct Buffer {
 
 impl Buffer {
     fn push(&mut self, data: &[u8], target: Option<u32>, accessor: Value) -> usize {
-        while self.bytes.len() % 4 != 0 {
+        while !self.bytes.len().is_multiple_of(4) {
             self.bytes.push(0);
         }
         let mut view = json!({"buffer": 0, "byteOffset": self.bytes.len(), "byteLength": data.len()});
@@ -117,7 +117,7 @@ pub fn write(twin: &Twin, verdicts: Verdicts) -> Result<Vec<u8>> {
     if !roots.is_empty() {
         nodes[0]["children"] = json!(roots);
     }
-    while buffer.bytes.len() % 4 != 0 {
+    while !buffer.bytes.len().is_multiple_of(4) {
         buffer.bytes.push(0);
     }
     let mut root = json!({

@@ -70,8 +70,9 @@ pub fn check(twin: &Twin) -> Result<()> {
         if f.part.solids.is_empty() || f.carcass.is_empty() {
             return Err(Error::Export(format!("{}: a part and its base need at least one box each", f.part.id)));
         }
-        if !unit || !(joint.upper.is_finite() && joint.upper > 0.0) || !(joint.damping >= 0.0 && joint.friction >= 0.0)
-        {
+        let opens = joint.upper.is_finite() && joint.upper > 0.0;
+        let resists = joint.damping >= 0.0 && joint.friction >= 0.0;
+        if !(unit && opens && resists) {
             return Err(Error::Export(format!(
                 "{}: the axis must be a unit vector, the upper limit positive, damping and friction not negative",
                 f.part.id

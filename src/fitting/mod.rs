@@ -8,7 +8,7 @@ use crate::articulation::{Articulation, JointKind};
 use crate::config;
 use crate::geometry::Face;
 use crate::geometry::moved::Rect;
-use crate::math::{Point, Vector, any_orthogonal, unit, unsigned_angle};
+use crate::math::{Vector, any_orthogonal, unit, unsigned_angle};
 use crate::pipeline::{Scene, SceneJoint};
 use crate::twin::{Furniture, Joint, OrientedBox, Part, Role, Solid, Twin, mass_properties};
 
@@ -279,6 +279,7 @@ fn bounds_of(solids: &[Solid], face: &Face) -> OrientedBox {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Point;
 
     fn scene_joint(kind: JointKind) -> SceneJoint {
         let face = Face {

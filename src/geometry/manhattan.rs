@@ -21,15 +21,61 @@ pub struct ManhattanFrame {
 /// Estimates the frame from the normals of the given views; `None` where no view shows three directions.
 pub fn estimate(recording: &Recording, views: &[usize], config: &config::Geometry) -> Result<Option<ManhattanFrame>> {
     let mut axes: Vec<(Vector, f64)> = Vec::new();
+    let mut all: Vec<Vector> = Vec::new();
     let mut frames = 0;
     for &view in views {
         let normals = view_normals(recording, view, config)?;
         let Some(triple) = frame_triple(&normals, config.normal_clusters) else { continue };
         let rotation = recording.frames[view].world_from_camera.rotation;
         axes.extend(triple.map(|(axis, weight)| (rotation * axis, weight)));
+        all.extend(normals.iter().map(|n| rotation * n));
         frames += 1;
     }
-    Ok(combine(&axes, &recording.up(), config.mean_shift_deg.to_radians()).map(|axes| ManhattanFrame { axes, frames }))
+    let Some(axes) = combine(&axes, &recording.up(), config.mean_shift_deg.to_radians()) else { return Ok(None) };
+    let axes = if config.refine_manhattan { refine(axes, &all) } else { axes };
+    Ok(Some(ManhattanFrame { axes, frames }))
+}
+
+/// Robust rotation of the frame onto all normals: each normal pulls its nearest axis, the less the farther it is.
+fn refine(start: [Vector; 3], normals: &[Vector]) -> [Vector; 3] {
+    const ROUNDS: usize = 12;
+    // Beyond the cut a normal belongs to another structure.
+    let cut = 25f64.to_radians();
+    let mut axes = start;
+    for round in 0..ROUNDS {
+        // Wide weights first, to arrive; then about the noise of estimated normals, to be robust.
+        let scale: f64 = if round < ROUNDS / 2 { 15f64.to_radians() } else { 6f64.to_radians() };
+        let mut pull = Matrix3::zeros();
+        for n in normals {
+            let mut best = (0, 0.0);
+            for (i, axis) in axes.iter().enumerate() {
+                let d = n.dot(axis);
+                if d.abs() > best.1 {
+                    best = (i, d.abs());
+                }
+            }
+            let angle = best.1.min(1.0).acos();
+            if angle > cut {
+                continue;
+            }
+            let weight = (1.0 + (angle / scale).powi(2)).powi(-2);
+            let axis = axes[best.0];
+            let signed = if n.dot(&axis) < 0.0 { -*n } else { *n };
+            // Columns of the frame on the right: the rotation that best turns the old axes into the pulled ones.
+            pull += signed * axis.transpose() * weight;
+        }
+        let svd = pull.svd(true, true);
+        let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { break };
+        let mut turn = u * v_t;
+        if turn.determinant() < 0.0 {
+            // Two walls only: the third direction follows from the first two.
+            let mut flipped = u;
+            flipped.column_mut(2).neg_mut();
+            turn = flipped * v_t;
+        }
+        axes = axes.map(|a| (turn * a).normalize());
+    }
+    axes
 }
 
 /// Camera-frame normals of a view: from its normals file, else from the slope of its depth.
@@ -129,7 +175,7 @@ mod tests {
         let room = rotation(&Vector::z(), 0.4);
         let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(5);
         let noise = Normal::new(0.0, 0.17).unwrap();
-        let mut axes = Vec::new();
+        let (mut axes, mut all) = (Vec::new(), Vec::new());
         for view in 0..8 {
             let camera = rotation(&Vector::new(0.3, 0.1, 1.0).normalize(), 0.2 * f64::from(view));
             let mut normals = Vec::new();
@@ -141,11 +187,12 @@ mod tests {
             }
             let triple = frame_triple(&normals, 6).unwrap();
             axes.extend(triple.map(|(a, w)| (camera.inverse() * a, w)));
+            all.extend(normals.iter().map(|n| camera.inverse() * n));
         }
-        let found = combine(&axes, &Vector::z(), 12f64.to_radians()).unwrap();
+        let found = refine(combine(&axes, &Vector::z(), 12f64.to_radians()).unwrap(), &all);
         for axis in [Vector::x(), Vector::y(), Vector::z()] {
             let best = found.iter().map(|f| unsigned_angle(f, &(room * axis))).fold(f64::INFINITY, f64::min);
-            assert!(best.to_degrees() < 2.0, "{}", best.to_degrees());
+            assert!(best.to_degrees() < 1.0, "{}", best.to_degrees());
         }
         assert!(found[2].dot(&Vector::z()) > 0.99);
         assert!((found[0].cross(&found[1]) - found[2]).norm() < 1e-9);

@@ -44,6 +44,9 @@ impl Region {
     }
 }
 
+/// A decoded local frame: its index, depth and mask.
+type LocalImage = (usize, Grid<f32>, Option<Grid<u8>>);
+
 /// Finds the confident region of one clip.
 pub fn localize(
     recording: &Recording,
@@ -56,7 +59,7 @@ pub fn localize(
     let Some(&nearest) = frames.first() else {
         return Ok(Outcome::Abstained("no frame with depth sees the grip while the furniture is closed".to_owned()));
     };
-    let mut images = Vec::new();
+    let mut images: Vec<LocalImage> = Vec::new();
     for &frame in &frames {
         if let Some(depth) = recording.depth(frame)? {
             images.push((frame, depth, recording.mask(frame)?));
@@ -194,7 +197,7 @@ fn sees(recording: &Recording, frame: usize, p: &Point) -> bool {
 }
 
 /// The class that most pixels around the grip show, at the grip's depth, in frames that see it.
-fn touched_class(recording: &Recording, images: &[(usize, Grid<f32>, Option<Grid<u8>>)], grip: &Point) -> Option<u8> {
+fn touched_class(recording: &Recording, images: &[LocalImage], grip: &Point) -> Option<u8> {
     // A fist's size around the grip, and the depth of a handle with its face behind it.
     const RADIUS_M: f64 = 0.06;
     const DEPTH_M: f64 = 0.12;

@@ -55,7 +55,7 @@ pub fn kmeans(normals: &[Vector], k: usize, rounds: usize) -> Vec<Cluster> {
     }
     let mut clusters: Vec<Cluster> =
         centers.into_iter().zip(counts).map(|(center, count)| Cluster { center, count }).collect();
-    clusters.sort_by(|a, b| b.count.cmp(&a.count));
+    clusters.sort_by_key(|c| std::cmp::Reverse(c.count));
     clusters
 }
 

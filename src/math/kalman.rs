@@ -35,6 +35,9 @@ pub struct Smoothed {
     pub accepted: Vec<bool>,
 }
 
+/// The prediction of one step: transition, mean, covariance, and whether the filter started (again) here.
+type Predicted = (Matrix2<f64>, Matrix3x2<f64>, Matrix2<f64>, bool);
+
 /// Filters forward and smooths backward. `times` (s) must not decrease; both slices have one length.
 #[must_use]
 pub fn smooth(times: &[f64], observations: &[Point], filter: &Filter) -> Smoothed {
@@ -46,7 +49,7 @@ pub fn smooth(times: &[f64], observations: &[Point], filter: &Filter) -> Smoothe
     let mut means: Vec<Matrix3x2<f64>> = Vec::with_capacity(n);
     let mut covariances: Vec<Matrix2<f64>> = Vec::with_capacity(n);
     // Predictions of step t from t-1, kept for the backward pass; identity transition at t = 0 and at a restart.
-    let mut predicted: Vec<(Matrix2<f64>, Matrix3x2<f64>, Matrix2<f64>, bool)> = Vec::with_capacity(n);
+    let mut predicted: Vec<Predicted> = Vec::with_capacity(n);
     let mut accepted = vec![false; n];
     let mut rejected_in_a_row = 0;
 

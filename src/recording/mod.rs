@@ -6,7 +6,6 @@ pub mod grid;
 pub mod images;
 pub mod narration;
 mod read;
-pub(crate) use read::json;
 pub mod trajectory;
 
 use std::collections::BTreeMap;

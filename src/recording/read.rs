@@ -7,14 +7,12 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Quaternion, UnitQuaternion};
 use serde::Deserialize;
-use serde::de::DeserializeOwned;
 
 use super::{Camera, Clip, Frame, FrameFiles, HandSample, Recording, Side};
 use crate::error::{Error, Result};
+use crate::json;
 use crate::math::{Point, Pose, Vector, stats};
 
-/// Text files above this are refused: hours of hands fit in it, and a broken export must not fill the memory.
-const MAX_TEXT_BYTES: u64 = 1 << 30;
 /// The longest line of a CSV or log file.
 pub(super) const MAX_LINE_BYTES: u64 = 64 << 10;
 /// Faults of one kind that are listed before "and n more".
@@ -108,8 +106,8 @@ pub(super) fn open(dir: &Path) -> Result<Recording> {
         return Err(Error::Io { path: dir.to_owned(), message: message.to_owned() });
     }
     let mut faults = Faults::default();
-    let cameras: CamerasFile = json(&dir.join("cameras.json"))?;
-    let clips: ClipsFile = json(&dir.join("clips.json"))?;
+    let cameras: CamerasFile = json::read(&dir.join("cameras.json"))?;
+    let clips: ClipsFile = json::read(&dir.join("clips.json"))?;
     let camera = check_camera(&cameras, &mut faults);
     let frames = frames(dir, &cameras, &mut faults);
     check_clips(&clips.clips, frames.len(), &mut faults);
@@ -125,57 +123,6 @@ pub(super) fn open(dir: &Path) -> Result<Recording> {
         .and_then(|d| d.file_name().map(|n| n.to_string_lossy().into_owned()))
         .unwrap_or_else(|| "recording".to_owned());
     Ok(Recording { name, dir: dir.to_owned(), camera, frames, clips: clips.clips, hands, labels, reconstruction })
-}
-
-fn read_text(path: &Path) -> Result<String> {
-    let file = File::open(path).map_err(|e| {
-        let mut error = Error::io(path, &e);
-        if let (Error::Io { message, .. }, Some(name)) = (&mut error, path.file_name()) {
-            *message += match name.to_str() {
-                Some("cameras.json") => "; a recording needs intrinsics and a pose per frame there",
-                Some("clips.json") => "; a recording needs its narrated segments there",
-                _ => "",
-            };
-        }
-        error
-    })?;
-    let mut text = String::new();
-    let read = file
-        .take(MAX_TEXT_BYTES + 1)
-        .read_to_string(&mut text)
-        .map_err(|e| Error::format(path, "text", format!("is not UTF-8 text ({e})")))?;
-    if read as u64 > MAX_TEXT_BYTES {
-        return Err(Error::format(path, "size", "is above 1 GiB; split the recording"));
-    }
-    Ok(text)
-}
-
-/// Parses JSON; an error says line, column, the frame it stands in, and what NaN means there.
-pub(crate) fn json<T: DeserializeOwned>(path: &Path) -> Result<T> {
-    let text = read_text(path)?;
-    serde_json::from_str(&text).map_err(|e| {
-        let offset: usize =
-            text.lines().take(e.line().saturating_sub(1)).map(|l| l.len() + 1).sum::<usize>() + e.column();
-        let mut start = offset.saturating_sub(24).min(text.len());
-        while !text.is_char_boundary(start) {
-            start -= 1;
-        }
-        let mut end = (offset + 8).min(text.len());
-        while !text.is_char_boundary(end) {
-            end += 1;
-        }
-        let near = &text[start..end];
-        let hint = if near.contains("NaN") || near.contains("Infinity") {
-            "; NaN and Infinity are not JSON: leave the frame out instead"
-        } else {
-            ""
-        };
-        let frame = text[..end].rfind("\"frame\":").map_or(String::new(), |at| {
-            let digits: String = text[at + 8..].trim_start().chars().take_while(char::is_ascii_digit).collect();
-            format!(", frame {digits}")
-        });
-        Error::format(path, format!("line {}, column {}{frame}", e.line(), e.column()), format!("{e}{hint}"))
-    })
 }
 
 fn check_camera(file: &CamerasFile, faults: &mut Faults) -> Camera {
@@ -332,7 +279,7 @@ fn hands(dir: &Path, frames: usize, faults: &mut Faults) -> Result<Vec<HandSampl
 }
 
 fn hands_json(path: &Path, faults: &mut Faults) -> Result<Vec<HandSample>> {
-    let file: HandsFile = json(path)?;
+    let file: HandsFile = json::read(path)?;
     let mut samples = Vec::new();
     for frame in file.frames {
         for hand in frame.hands {
@@ -467,7 +414,7 @@ fn labels(dir: &Path) -> Result<BTreeMap<u8, String>> {
     if !path.is_file() {
         return Ok(BTreeMap::new());
     }
-    let raw: BTreeMap<String, String> = json(&path)?;
+    let raw: BTreeMap<String, String> = json::read(&path)?;
     raw.into_iter()
         .map(|(class, name)| match class.parse::<u8>() {
             Ok(class) => Ok((class, name)),

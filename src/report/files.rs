@@ -104,18 +104,7 @@ pub fn articulations(scene: &Scene, reasoner: &str) -> crate::error::Result<Stri
             })
             .collect(),
     };
-    to_json(&file)
-}
-
-/// Pretty JSON with a final newline.
-///
-/// # Errors
-/// Where a value cannot be written as JSON.
-pub fn to_json<T: Serialize>(value: &T) -> crate::error::Result<String> {
-    let mut text = serde_json::to_string_pretty(value)
-        .map_err(|e| crate::error::Error::Export(format!("cannot be written as JSON: {e}")))?;
-    text.push('\n');
-    Ok(text)
+    crate::json::text(&file)
 }
 
 /// One row a clip: the scene's joint where the clip shows one, its own range, the twin's box.

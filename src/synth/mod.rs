@@ -97,7 +97,7 @@ impl Recorded {
     /// # Errors
     /// Where a value cannot be written as JSON, which would be a bug.
     pub fn tables(&self) -> Result<Vec<(String, String)>> {
-        let text = |v: &Value| crate::report::files::to_json(v);
+        let text = |v: &Value| crate::json::text(v);
         Ok(vec![
             ("cameras.json".to_owned(), text(&self.cameras())?),
             ("clips.json".to_owned(), text(&self.clips())?),

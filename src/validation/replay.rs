@@ -23,6 +23,17 @@ pub struct Drive {
     pub grip: Point,
 }
 
+/// What surrounds the part.
+#[derive(Debug, Clone, Copy)]
+pub struct Surroundings<'a> {
+    /// Boxes fixed in the world, world frame.
+    pub obstacles: &'a [OrientedBox],
+    /// Against gravity, unit.
+    pub up: &'a Vector,
+    /// Density of the part's boxes, kg/m^3.
+    pub density: f64,
+}
+
 /// What the simulation showed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Replay {
@@ -54,8 +65,7 @@ fn collider(shape: &OrientedBox, origin: &Point, density: f32) -> ColliderBuilde
     ColliderBuilder::cuboid(half.x, half.y, half.z).position(RapierPose::from(pose)).density(density).friction(0.2)
 }
 
-/// Pulls `part` along `drive` and back under `joint` (which may be a rival of the part's own), with `obstacles` fixed in
-/// the world.
+/// Pulls `part` along `drive` and back under `joint` (which may be a rival of the part's own) with the limits 0..`upper`.
 ///
 /// # Errors
 /// Where the simulation gives no finite state.
@@ -63,15 +73,14 @@ pub fn simulate(
     part: &Part,
     joint: &Articulation,
     upper: f64,
-    obstacles: &[OrientedBox],
+    around: Surroundings,
     drive: &Drive,
-    up: &Vector,
-    density: f64,
     config: &config::Validation,
 ) -> Result<Replay> {
     let (Some(&first), Some(&end)) = (drive.path.first(), drive.times_secs.last()) else {
         return Err(Error::Simulation(format!("{}: an empty path", part.id)));
     };
+    let Surroundings { obstacles, up, density } = around;
     let origin = joint.origin;
     let dt = config.step_secs;
     let mut world = PhysicsWorld::new();

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::replay::{Drive, Replay, simulate};
+use super::replay::{Drive, Replay, Surroundings, simulate};
 use crate::articulation::{Action, Articulation, JointKind};
 use crate::config;
 use crate::error::Result;
@@ -105,10 +105,9 @@ pub fn validate(twin: &Twin, hands: &[Hands], up: &Vector, config: &config::Vali
             let empty = Hands::new();
             let clips = hands.get(i).unwrap_or(&empty);
             let obstacles = obstacles(twin, i);
-            let checks: Vec<ClipCheck> = clips
-                .iter()
-                .map(|(name, t)| check_clip(name, t, furniture, &obstacles, up, twin.density_kg_per_m3, config))
-                .collect::<Result<_>>()?;
+            let around = Surroundings { obstacles: &obstacles, up, density: twin.density_kg_per_m3 };
+            let checks: Vec<ClipCheck> =
+                clips.iter().map(|(name, t)| check_clip(name, t, furniture, around, config)).collect::<Result<_>>()?;
             Ok(judge(furniture, checks, config))
         })
         .collect::<Result<_>>()?;
@@ -130,9 +129,7 @@ fn check_clip(
     name: &str,
     trajectory: &Trajectory,
     furniture: &Furniture,
-    obstacles: &[OrientedBox],
-    up: &Vector,
-    density: f64,
+    around: Surroundings,
     config: &config::Validation,
 ) -> Result<ClipCheck> {
     let path = trajectory.positions();
@@ -144,11 +141,12 @@ fn check_clip(
     let drive = Drive { times_secs, path, grip };
     // Rivals get all the room they want: what is compared is how well the motion fits, not a limit.
     let ample = |j: &Articulation| if j.kind == JointKind::Revolute { std::f64::consts::PI } else { 2.0 };
-    let replay = simulate(part, &own, part.joint.upper, obstacles, &drive, up, density, config)?;
-    let free = simulate(part, &own, ample(&own), &[], &drive, up, density, config)?;
+    let replay = simulate(part, &own, part.joint.upper, around, &drive, config)?;
+    let alone = Surroundings { obstacles: &[], ..around };
+    let free = simulate(part, &own, ample(&own), alone, &drive, config)?;
     let mut rivals = Vec::new();
     for (name, rival) in rivals_of(furniture, &trajectory.closed_grip()) {
-        let r = simulate(part, &rival, ample(&rival), &[], &drive, up, density, config)?;
+        let r = simulate(part, &rival, ample(&rival), alone, &drive, config)?;
         rivals.push(RivalCheck { name, rms_m: r.rms_m });
     }
     rivals.sort_by(|a, b| a.rms_m.total_cmp(&b.rms_m));

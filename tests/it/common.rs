@@ -1,0 +1,86 @@
+//! What the tests share: recordings made once, the binary, data that may be there.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::LazyLock;
+
+use paws_twin::config::Config;
+use paws_twin::fitting;
+use paws_twin::geometry::segments::Lsd;
+use paws_twin::pipeline::{self, Scene};
+use paws_twin::reasoning::heuristic::Geometric;
+use paws_twin::recording::Recording;
+use paws_twin::synth::{Options, Recorded, Tier};
+use paws_twin::twin::Twin;
+use tempfile::TempDir;
+
+/// A small clean recording that tests copy and break; rendered once.
+pub static SMALL: LazyLock<TempDir> = LazyLock::new(|| {
+    let dir = tempfile::tempdir().unwrap();
+    record(&Options { seed: 3, tier: Tier::Clean, width: 160, parts: 1 }, dir.path());
+    dir
+});
+
+/// Renders a recording into a folder.
+pub fn record(options: &Options, dir: &Path) {
+    let recorded = Recorded::new(options).unwrap();
+    let write = |name: &str, bytes: &[u8]| {
+        let path = dir.join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, bytes).unwrap();
+    };
+    for (name, text) in recorded.tables().unwrap() {
+        write(&name, text.as_bytes());
+    }
+    for frame in 0..recorded.frames() {
+        for (name, bytes) in recorded.images(frame).unwrap() {
+            write(&name, &bytes);
+        }
+    }
+}
+
+/// The whole inference on a folder.
+pub fn twin_of(dir: &Path) -> (Recording, Scene, Twin) {
+    let config = Config::default();
+    let recording = Recording::open(dir).unwrap();
+    let reasoner = Geometric { reasoning: config.reasoning.clone(), inference: config.inference.clone() };
+    let scene = pipeline::infer(&recording, &config, &Lsd, &reasoner, &|_, _, _| {}).unwrap();
+    let twin = fitting::fit(&scene, &recording.up(), &config.fitting);
+    (recording, scene, twin)
+}
+
+/// Copies a folder.
+pub fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let target = to.join(entry.file_name());
+        if entry.file_type().unwrap().is_dir() {
+            copy(&entry.path(), &target);
+        } else {
+            std::fs::copy(entry.path(), target).unwrap();
+        }
+    }
+}
+
+/// Runs `paws`.
+pub fn paws(args: &[&str], dir: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_paws")).args(args).current_dir(dir).output().unwrap()
+}
+
+/// Standard error as text.
+pub fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Optional data beside the project (`PAWS_DATA`, else `../shared/data`): tests that use it say so when they skip.
+pub fn optional_data(name: &str) -> Option<PathBuf> {
+    let root = std::env::var_os("PAWS_DATA")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
+    let path = root.join(name);
+    if path.exists() {
+        return Some(path);
+    }
+    eprintln!("skipped: {} is not there (set PAWS_DATA to a folder that has it)", path.display());
+    None
+}

@@ -1,0 +1,89 @@
+//! Data flows one way: a module uses only lower floors; two on one floor are strangers.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+const FLOORS: [&[&str]; 15] = [
+    &["error"],
+    &["json", "math"],
+    &["articulation"],
+    &["recording", "config"],
+    &["twin"],
+    &["hands", "synth"],
+    &["localization"],
+    &["geometry"],
+    &["reasoning"],
+    &["inference"],
+    &["pipeline"],
+    &["fitting"],
+    &["export", "validation", "evaluation"],
+    &["report"],
+    &["cli"],
+];
+
+fn uses(dir: &Path, module: &str, out: &mut Vec<(String, String)>) {
+    for entry in std::fs::read_dir(dir).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+        let module = if module.is_empty() { name.clone() } else { module.to_owned() };
+        if path.is_dir() {
+            uses(&path, &module, out);
+            continue;
+        }
+        let text = std::fs::read_to_string(&path).unwrap();
+        // Comments may point anywhere.
+        let code: Vec<&str> = text.lines().filter(|l| !l.trim_start().starts_with("//")).collect();
+        let text = code.join("\n");
+        for (i, _) in text.match_indices("crate::") {
+            let rest = &text[i + "crate::".len()..];
+            // `use crate::{a, b::c}` names several.
+            let list = rest.strip_prefix('{').and_then(|r| r.split_once("};")).map_or(rest, |(inside, _)| inside);
+            let parts: Vec<&str> = if rest.starts_with('{') { list.split(',').collect() } else { vec![rest] };
+            for part in parts {
+                let word: String = part.trim().chars().take_while(|c| c.is_ascii_alphanumeric() || *c == '_').collect();
+                if !word.is_empty() {
+                    out.push((module.clone(), word));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn modules_use_lower_floors_only() {
+    let floor: BTreeMap<&str, usize> =
+        FLOORS.iter().enumerate().flat_map(|(i, names)| names.iter().map(move |n| (*n, i))).collect();
+    let mut all = Vec::new();
+    uses(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), "", &mut all);
+    assert!(all.len() > 100, "the scan found next to nothing");
+    for (module, used) in all {
+        if ["lib", "main"].contains(&module.as_str()) || module == used {
+            continue;
+        }
+        let (Some(here), Some(there)) = (floor.get(module.as_str()), floor.get(used.as_str())) else {
+            panic!("{module} uses {used}: one of them stands on no floor; add it to FLOORS");
+        };
+        assert!(there < here, "{module} (floor {here}) uses {used} (floor {there})");
+    }
+}
+
+#[test]
+fn only_the_command_line_writes_files() {
+    fn scan(dir: &Path) {
+        for entry in std::fs::read_dir(dir).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                if !path.ends_with("cli") {
+                    scan(&path);
+                }
+                continue;
+            }
+            let text = std::fs::read_to_string(&path).unwrap();
+            let code = text.split("#[cfg(test)]").next().unwrap();
+            for word in ["fs::write", "File::create", "create_dir", "println!", "eprintln!"] {
+                assert!(!code.contains(word), "{} has {word}", path.display());
+            }
+        }
+    }
+    scan(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"));
+}

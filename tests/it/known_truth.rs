@@ -1,0 +1,41 @@
+//! The whole pipeline on kitchens whose answer is known: without noise, then with the errors of real estimators.
+
+use paws_twin::evaluation::{Report, Rule, Truth, evaluate};
+use paws_twin::report::files::predictions;
+use paws_twin::synth::{Options, Tier};
+
+use crate::common::{record, twin_of};
+
+fn report(seed: u64, tier: Tier, parts: usize) -> Report {
+    let dir = tempfile::tempdir().unwrap();
+    record(&Options { seed, tier, width: 320, parts }, dir.path());
+    let (_, scene, twin) = twin_of(dir.path());
+    evaluate(&predictions(&scene, &twin), &[Truth::read(dir.path()).unwrap()])
+}
+
+fn shares(report: &Report, rule: Rule) -> [f64; 3] {
+    let micro = report.rules.iter().find(|r| r.rule == rule).unwrap().micro;
+    [micro.m, micro.ma, micro.mao]
+}
+
+#[test]
+fn without_noise_every_joint_is_right_to_a_degree_and_a_few_centimetres() {
+    let report = report(101, Tier::Clean, 6);
+    assert_eq!((report.answered, report.clips, report.false_positives), (12, 12, 0));
+    assert_eq!(shares(&report, Rule::Sim), [1.0; 3], "{:#?}", report.per_clip);
+    for clip in &report.per_clip {
+        let m = clip.measured.as_ref().unwrap();
+        assert!(m.type_right && m.signed_axis_rad < 1f64.to_radians(), "{clip:?}");
+        assert!(m.truth_to_line_m.unwrap() < 0.04, "{clip:?}");
+    }
+}
+
+#[test]
+fn with_noise_and_outliers_types_axes_and_hinges_hold() {
+    for seed in [102, 103] {
+        let report = report(seed, Tier::Realistic, 5);
+        assert_eq!((report.answered, report.clips, report.false_positives), (10, 10, 0), "seed {seed}");
+        let [m, ma, mao] = shares(&report, Rule::UsdnetMaoSt);
+        assert!(m >= 0.9 && ma >= 0.9 && mao >= 0.9, "seed {seed}: {m} {ma} {mao}");
+    }
+}
