@@ -276,7 +276,7 @@ fn infer_clip(
         grips: [region.grip, trajectory.open_grip()],
         viewpoint: region.viewpoint,
         manhattan: room,
-        up: recording.up(),
+        up: upward(recording, room),
     };
     result.face = face::fit(&around, &config.geometry, config.seed);
 
@@ -330,6 +330,12 @@ fn infer_clip(
     }
     result.answer = Some(answer);
     Ok(result)
+}
+
+/// Up, as the room's own upright edges have it where they are near the world's (which may be off by a degree).
+fn upward(recording: &Recording, room: Option<&ManhattanFrame>) -> crate::math::Vector {
+    let up = recording.up();
+    room.map(|r| r.axes[2]).filter(|axis| crate::math::signed_angle(axis, &up) < 5f64.to_radians()).unwrap_or(up)
 }
 
 /// Points of the touched furniture: of the local frames, and of the global views where masks tell what belongs to it.

@@ -209,6 +209,18 @@ pub struct Twin {
     pub density_kg_per_m3: f64,
     /// Furniture in the order of the joints.
     pub furniture: Vec<Furniture>,
+    /// Joints that could not be built, with the reason.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<LeftOut>,
+}
+
+/// A joint that is not in the twin.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LeftOut {
+    /// The joint's id.
+    pub id: String,
+    /// Why.
+    pub reason: String,
 }
 
 /// Mass properties of boxes of one density; `None` for no boxes.

@@ -173,6 +173,9 @@ pub fn summary(scene: &Scene, twin: &Twin, validation: &Validation) -> String {
     } else {
         text += &aligned(&rows);
     }
+    for left in &twin.left_out {
+        reasons += &format!("{}: not built, because {}\n", left.id, left.reason);
+    }
     if !reasons.is_empty() {
         text += &format!("\n{reasons}");
     }

@@ -10,7 +10,7 @@ use crate::geometry::Face;
 use crate::geometry::moved::Rect;
 use crate::math::{Vector, any_orthogonal, unit, unsigned_angle};
 use crate::pipeline::{Scene, SceneJoint};
-use crate::twin::{Furniture, Joint, OrientedBox, Part, Role, Solid, Twin, mass_properties};
+use crate::twin::{Furniture, Joint, LeftOut, OrientedBox, Part, Role, Solid, Twin};
 
 /// Height of a handle's bar over its face, metres; and half the width of bar and posts.
 const HANDLE_STANDOFF_M: f64 = 0.035;
@@ -37,16 +37,66 @@ pub fn fit(scene: &Scene, up: &Vector, config: &config::Fitting) -> Twin {
     for (plan, (_, rect)) in plans.iter_mut().zip(rects) {
         plan.rect = rect;
     }
-    let mut furniture: Vec<Furniture> = plans.iter().map(|p| build(p, config.carcass_depth_m, up, config)).collect();
-    // Carcasses behind faces that meet at a corner share space: the later one gets shallower until it does not.
-    for i in 1..furniture.len() {
-        let mut depth = config.carcass_depth_m;
-        while overlap::any(&furniture[..i], &furniture[i]) && depth > 0.1 {
-            depth -= 0.05;
-            furniture[i] = build(&plans[i], depth, up, config);
+    // What is surer stands; what is less sure gives way.
+    let mut order: Vec<usize> = (0..plans.len()).collect();
+    let sureness = |i: usize| plans[i].joint.type_probability * (plans[i].joint.clips.len() as f64).min(3.0);
+    order.sort_by(|&a, &b| sureness(b).total_cmp(&sureness(a)).then(a.cmp(&b)));
+    let mut placed: Vec<(usize, Furniture)> = Vec::new();
+    let mut left_out = Vec::new();
+    for i in order {
+        match place(&plans[i], &placed, config) {
+            Some(furniture) => placed.push((i, furniture)),
+            None => left_out.push(LeftOut {
+                id: plans[i].joint.id.clone(),
+                reason: "its front shares space with furniture that is surer".to_owned(),
+            }),
         }
     }
-    Twin { name: scene.recording.clone(), density_kg_per_m3: config.density_kg_per_m3, furniture }
+    placed.sort_by_key(|(i, _)| *i);
+    let furniture = placed.into_iter().map(|(_, f)| f).collect();
+    Twin { name: scene.recording.clone(), density_kg_per_m3: config.density_kg_per_m3, furniture, left_out }
+}
+
+/// Builds a piece that shares no space with what stands already: with a shallower carcass (pieces that meet at a corner),
+/// then without the boards that are in the way, then with a smaller front. `None` where even that does not fit.
+fn place(plan: &Plan, placed: &[(usize, Furniture)], config: &config::Fitting) -> Option<Furniture> {
+    const DEPTH_STEP_M: f64 = 0.05;
+    let free = |f: &Furniture| !placed.iter().any(|(_, other)| overlap::furniture(other, f));
+    for share in [1.0, 0.85, 0.7] {
+        let plan = Plan { rect: shrunk(plan, share), ..plan.clone() };
+        let mut depth = config.carcass_depth_m;
+        while depth > 0.1 {
+            let piece = build(&plan, depth, config);
+            if free(&piece) {
+                return Some(piece);
+            }
+            depth -= DEPTH_STEP_M;
+        }
+        let mut piece = build(&plan, config.carcass_depth_m, config);
+        let blocked = |s: &Solid| placed.iter().any(|(_, other)| overlap::with(other, &s.shape));
+        piece.carcass.retain(|s| !blocked(s));
+        piece.part.solids.retain(|s| s.role != Role::Tray || !blocked(s));
+        if !piece.carcass.is_empty() && free(&piece) {
+            return Some(piece);
+        }
+    }
+    None
+}
+
+/// The part's rectangle made smaller about the grip; a hinge's edge stays where it is.
+fn shrunk(plan: &Plan, share: f64) -> Rect {
+    let mut bounds = plan.rect.bounds;
+    let hinge = (plan.articulation.kind == JointKind::Revolute).then(|| {
+        usize::from(
+            plan.articulation.axis.dot(&plan.face.up).abs() < plan.articulation.axis.dot(&plan.face.right).abs(),
+        )
+    });
+    for (axis, b) in bounds.iter_mut().enumerate() {
+        if hinge != Some(axis) {
+            *b = b.map(|x| x * share);
+        }
+    }
+    Rect { bounds }
 }
 
 /// Face, rectangle and the joint moved onto them.
@@ -132,7 +182,7 @@ fn face_box(face: &Face, bounds: [[f64; 2]; 3]) -> OrientedBox {
     }
 }
 
-fn build(plan: &Plan, depth: f64, up: &Vector, config: &config::Fitting) -> Furniture {
+fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
     let face = &plan.face;
     let id = &plan.joint.id;
     let gap = config.clearance_m;
@@ -186,7 +236,6 @@ fn build(plan: &Plan, depth: f64, up: &Vector, config: &config::Fitting) -> Furn
     } else {
         (config.hinge_damping, config.hinge_friction)
     };
-    let friction = friction.max(holding_torque(&plan.articulation, &solids, upper, up, config));
     let least = if slide { 0.01 } else { 0.02 };
     let bounds = bounds_of(&solids, face);
     let mut articulation = plan.articulation;
@@ -214,22 +263,6 @@ fn build(plan: &Plan, depth: f64, up: &Vector, config: &config::Fitting) -> Furn
             bounds,
         },
     }
-}
-
-/// Doors that gravity would swing (dishwashers, flaps, lids) have springs or lifters that hold them anywhere; here dry
-/// friction does: a tenth more than the largest torque of the part's weight. Zero for slides and upright hinges.
-fn holding_torque(joint: &Articulation, solids: &[Solid], upper: f64, up: &Vector, config: &config::Fitting) -> f64 {
-    const GRAVITY: f64 = 9.81;
-    let Some(mass) = mass_properties(solids, config.density_kg_per_m3) else { return 0.0 };
-    // A degree of tilt, which a world frame may have, is no design.
-    if joint.kind == JointKind::Prismatic || joint.axis.dot(up).abs() > 0.9 {
-        return 0.0;
-    }
-    let torque = (0..=16).map(|i| {
-        let center = joint.motion(upper * f64::from(i) / 16.0) * mass.center;
-        (center - joint.origin).cross(&(up * -(mass.mass * GRAVITY))).dot(&joint.axis).abs()
-    });
-    1.1 * torque.fold(0.0, f64::max)
 }
 
 /// A bar on two posts where the hand was; upright beside an upright hinge, level otherwise.

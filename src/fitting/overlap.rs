@@ -23,13 +23,16 @@ pub fn boxes(a: &OrientedBox, b: &OrientedBox) -> bool {
     query::intersection_test(&pose(a), &shrunk(a), &pose(b), &shrunk(b)).is_ok_and(|hit| hit.intersecting)
 }
 
-/// Whether a piece of furniture shares space with any of the others, closed.
+/// Whether a box shares space with a piece of furniture, closed.
 #[must_use]
-pub fn any(others: &[Furniture], one: &Furniture) -> bool {
-    let solids =
-        |f: &Furniture| -> Vec<OrientedBox> { f.carcass.iter().chain(&f.part.solids).map(|s| s.shape).collect() };
-    let mine = solids(one);
-    others.iter().any(|f| solids(f).iter().any(|a| mine.iter().any(|b| boxes(a, b))))
+pub fn with(piece: &Furniture, shape: &OrientedBox) -> bool {
+    piece.carcass.iter().chain(&piece.part.solids).any(|s| boxes(&s.shape, shape))
+}
+
+/// Whether two pieces of furniture share space, closed.
+#[must_use]
+pub fn furniture(a: &Furniture, b: &Furniture) -> bool {
+    b.carcass.iter().chain(&b.part.solids).any(|s| with(a, &s.shape))
 }
 
 /// Cuts rectangles of one plane that overlap at the middle of the overlap, across its narrower direction.

@@ -121,6 +121,7 @@ pub fn fit(around: &Surroundings, config: &config::Geometry, seed: u64) -> Optio
         }
     }
     let plane = candidates.into_iter().max_by(|a, b| score(a).total_cmp(&score(b)))?;
+    let plane = uprighted(plane, &around.up, &near, tolerance);
     let support = share(&plane);
     // A twentieth of the neighbourhood on a plane happens by chance; a face fills far more.
     if support < 0.05 {
@@ -141,6 +142,18 @@ pub fn fit(around: &Surroundings, config: &config::Geometry, seed: u64) -> Optio
         face.extent[axis] = [quantile(&values, 0.01)?.min(0.0), quantile(&values, 0.99)?.max(0.0)];
     }
     Some(face)
+}
+
+/// A front within 15 degrees of upright is upright: furniture stands on its feet, and a drawer that runs downhill opens by
+/// itself. The offset follows from the points that lay on the plane.
+fn uprighted(plane: Plane, up: &Vector, near: &[Point], tolerance: f64) -> Plane {
+    if plane.normal.dot(up).abs() > 15f64.to_radians().sin() {
+        return plane;
+    }
+    let Some(normal) = unit(&reject(&plane.normal, up)) else { return plane };
+    let offsets: Vec<f64> =
+        near.iter().filter(|p| plane.height(p).abs() <= tolerance).map(|p| normal.dot(&p.coords)).collect();
+    crate::math::stats::median(&offsets).map_or(plane, |offset| Plane { normal, offset })
 }
 
 /// How likely a plane is a front that opens, whatever the points say; 1 at best.

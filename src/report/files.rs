@@ -129,8 +129,9 @@ pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
             };
             let joint = scene.joints.iter().find(|j| j.clips.contains(&c.clip.clip));
             let part = joint.and_then(|j| twin.furniture.iter().map(|f| &f.part).find(|p| p.id == j.id));
-            let (Some(joint), Some(part), Some(trajectory)) = (joint, part, &c.trajectory) else { return row };
-            let phi = part.joint.articulation;
+            let (Some(joint), Some(trajectory)) = (joint, &c.trajectory) else { return row };
+            // A joint that could not be built is still an answer.
+            let phi = part.map_or(joint.joint, |p| p.joint.articulation);
             let path = trajectory.positions();
             row.kind = Some(phi.kind);
             row.axis = Some(phi.axis);
@@ -140,7 +141,7 @@ pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
                 crate::articulation::JointKind::Prismatic => path[0],
             });
             row.range = Some(inference::observed_range(&phi, &trajectory.closed_grip(), &path));
-            row.part_box = Some(part.bounds);
+            row.part_box = part.map(|p| p.bounds);
             row.confidence = Some(joint.type_probability);
             row.joint = Some(joint.id.clone());
             row

@@ -59,7 +59,7 @@ fn hand(joint: &Articulation, range: f64) -> Trajectory {
 }
 
 fn verdict(furniture: Furniture, trajectory: &Trajectory) -> (Verdict, String) {
-    let twin = Twin { name: "t".to_owned(), density_kg_per_m3: 700.0, furniture: vec![furniture] };
+    let twin = Twin { name: "t".to_owned(), density_kg_per_m3: 700.0, furniture: vec![furniture], left_out: vec![] };
     let hands = vec![vec![("clip".to_owned(), trajectory)]];
     let validation = validate(&twin, &hands, &Vector::z(), &Config::default().validation).unwrap();
     (validation.joints[0].verdict, validation.joints[0].reason.clone())
