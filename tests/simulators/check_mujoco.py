@@ -69,9 +69,7 @@ def check(path, folder):
     # A stop is a spring of the joint's time constant (solreflimit; a URDF cannot set it): the weight of a lid rests on it.
     mujoco.mj_resetData(model, data)
     mujoco.mj_forward(model, data)
-    full = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, full, data.qM)
-    give = np.abs(data.qfrc_bias) / np.diag(full) * model.jnt_solref[:, 0] ** 2
+    give = np.abs(data.qfrc_bias) / model.dof_M0 * model.jnt_solref[:, 0] ** 2
     if not step(model, data, REST_SECS):
         fail(path, "the state is not finite at rest")
     drift = np.abs(data.qpos) - give
