@@ -160,12 +160,20 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
     };
     for direction in directions {
         if let Some(joint) = arc_about(evidence.path, &direction) {
-            let side = evidence.face.map(|face| {
-                let [right, up, _] = face.coordinates(&joint.origin);
-                if unsigned_angle(&direction, &face.up) < 0.1 { side_of(right, true) } else { side_of(up, false) }
-            });
+            let side = evidence.face.map(|face| side_at(face, &direction, &joint.origin));
             out.push(AxisCandidate { joint, source: AxisSource::HandArc, side, views: 0, length_m: 0.0 });
         }
+    }
+}
+
+/// The edge at which a hinge through `origin` along the face's `axis` lies.
+#[must_use]
+pub fn side_at(face: &Face, axis: &Vector, origin: &Point) -> HingeSide {
+    let [right, up, _] = face.coordinates(origin);
+    if unsigned_angle(axis, &face.up) < unsigned_angle(axis, &face.right) {
+        side_of(right, true)
+    } else {
+        side_of(up, false)
     }
 }
 

@@ -1,175 +1,178 @@
-//! Clips of one joint merged into one scene-level joint by RANSAC and PCA (§3.4, §C.2).
+//! Clips of one joint found and merged into one scene-level joint (§3.4, §C.2).
 
-use std::collections::BTreeMap;
-
-use super::{ClipJoint, mean_direction};
-use crate::articulation::{Articulation, JointKind};
+use super::mean_direction;
+use crate::articulation::{Action, Articulation, JointKind};
 use crate::config;
 use crate::geometry::Face;
-use crate::math::{Point, signed_angle, unsigned_angle};
+use crate::geometry::moved::Rect;
+use crate::math::{Point, Vector, signed_angle, unsigned_angle};
 
-/// A clip's joint with its place in the scene.
-#[derive(Debug, Clone)]
-pub struct Member<'a> {
-    /// Index of the clip in the recording.
-    pub clip: usize,
-    /// What was inferred.
-    pub joint: &'a ClipJoint,
-    /// The touched face.
-    pub face: Option<&'a Face>,
+/// What tells whether two clips show one part.
+#[derive(Debug, Clone, Copy)]
+pub struct Held {
+    /// Opening or closing.
+    pub action: Action,
+    /// The grip at the closed and the open end, as far as the hand was seen.
+    pub closed: Point,
+    /// The grip at the open end.
+    pub open: Point,
+    /// Outward normal of the touched face, where one was found.
+    pub normal: Option<Vector>,
+    /// What the furniture's name says about the type.
+    pub kind: Option<JointKind>,
+    /// The face and the part of it that moved, where it was seen.
+    pub part: Option<(Face, Rect)>,
+    /// The clip's own joint, where there is one.
+    pub joint: Option<Articulation>,
 }
 
-/// One joint of the scene.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SceneJoint {
-    /// The merged joint.
-    pub joint: Articulation,
-    /// Indices of the clips that show it, in order.
-    pub clips: Vec<usize>,
-    /// The grip when closed: mean over the clips.
-    pub grip: Point,
-    /// Probability of the type, all clips together.
-    pub type_probability: f64,
-}
-
-/// Groups clips that show one joint: same closed grip, same face, in any order of time.
+/// Groups clips that show one part, given in the order of time. Returns indices into `clips`.
 ///
-/// The type is not asked: two clips that hold the same handle of the same face show the same joint even where one of
-/// them was read wrongly; the merge then decides.
+/// Two clips belong together if the grip was at the same place of the same face when closed; or if one closes what the one
+/// before it opened: people take hold of a part where they left it.
 #[must_use]
-pub fn group(members: &[Member], config: &config::Inference) -> Vec<Vec<usize>> {
+pub fn group(clips: &[Held], config: &config::Inference) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
-    for (i, member) in members.iter().enumerate() {
-        let nearest = groups
-            .iter_mut()
-            .filter(|g| g.iter().all(|&j| same_part(&members[j], member, config)))
-            .min_by(|a, b| grip_distance(a, members, member).total_cmp(&grip_distance(b, members, member)));
-        match nearest {
-            Some(group) if config.merge_clips => group.push(i),
-            _ => groups.push(vec![i]),
+    for (i, clip) in clips.iter().enumerate() {
+        if !config.merge_clips {
+            groups.push(vec![i]);
+            continue;
+        }
+        let continues = |g: &Vec<usize>| g.last() == Some(&i.wrapping_sub(1)) && closes(&clips[i - 1], clip, config);
+        let distance =
+            |g: &Vec<usize>| g.iter().map(|&j| (clips[j].closed - clip.closed).norm()).fold(f64::INFINITY, f64::min);
+        let home = match groups.iter().position(continues) {
+            Some(home) => Some(home),
+            None => (0..groups.len())
+                .filter(|&g| groups[g].iter().any(|&j| same_place(&clips[j], clip, config)))
+                .min_by(|&a, &b| distance(&groups[a]).total_cmp(&distance(&groups[b]))),
+        };
+        match home {
+            Some(home) => groups[home].push(i),
+            None => groups.push(vec![i]),
         }
     }
     groups
 }
 
-fn grip_distance(group: &[usize], members: &[Member], member: &Member) -> f64 {
-    group.iter().map(|&j| (members[j].joint.grip - member.joint.grip).norm()).fold(f64::INFINITY, f64::min)
+fn names_agree(a: &Held, b: &Held) -> bool {
+    a.kind.zip(b.kind).is_none_or(|(a, b)| a == b)
 }
 
-fn same_part(a: &Member, b: &Member, config: &config::Inference) -> bool {
-    let angle = config.merge_angle_deg.to_radians();
-    let faces_agree = match (a.face, b.face) {
-        (Some(fa), Some(fb)) => signed_angle(&fa.normal, &fb.normal) <= angle,
+/// Whether `b` closes what `a` opened.
+fn closes(a: &Held, b: &Held, config: &config::Inference) -> bool {
+    a.action == Action::Open
+        && b.action == Action::Close
+        && names_agree(a, b)
+        && (a.open - b.open).norm() <= config.merge_grip_m
+}
+
+/// Whether the grips coincide when closed.
+fn same_place(a: &Held, b: &Held, config: &config::Inference) -> bool {
+    let faces_agree = match (a.normal, b.normal) {
+        (Some(a), Some(b)) => signed_angle(&a, &b) <= config.merge_angle_deg.to_radians(),
         _ => true,
     };
     // A part is opened and closed in turn: two openings in a row are two parts unless their grips nearly coincide.
-    let same_action = a.joint.action == b.joint.action;
-    let limit = if same_action { 0.6 * config.merge_grip_m } else { config.merge_grip_m };
-    faces_agree && (a.joint.grip - b.joint.grip).norm() <= limit
+    let limit = if a.action == b.action { 0.6 * config.merge_grip_m } else { config.merge_grip_m };
+    faces_agree && (a.closed - b.closed).norm() <= limit && outlines_agree(a, b) && joints_agree(a, b)
 }
 
-/// Merges one group. The type goes to the larger sum of log-odds; the axis is the consensus (each member tried as the
-/// seed, the heaviest agreement wins) averaged by PCA; the origin is averaged on it.
+/// Handles of neighbours can be a hand's width apart; the parts behind them do not overlap.
+fn outlines_agree(a: &Held, b: &Held) -> bool {
+    const LEAST_IOU: f64 = 0.3;
+    let (Some((face, mine)), Some((other_face, theirs))) = (&a.part, &b.part) else { return true };
+    let [right, up, _] = face.coordinates(&other_face.center);
+    let theirs = [theirs.bounds[0].map(|x| x + right), theirs.bounds[1].map(|x| x + up)];
+    let overlap: f64 =
+        (0..2).map(|k| (mine.bounds[k][1].min(theirs[k][1]) - mine.bounds[k][0].max(theirs[k][0])).max(0.0)).product();
+    let area = |b: &[[f64; 2]; 2]| (b[0][1] - b[0][0]) * (b[1][1] - b[1][0]);
+    overlap >= LEAST_IOU * (area(&mine.bounds) + area(&theirs) - overlap)
+}
+
+/// Two doors side by side are hinged at their outer edges: both hinges are sure and far apart.
+fn joints_agree(a: &Held, b: &Held) -> bool {
+    let (Some(a), Some(b)) = (&a.joint, &b.joint) else { return true };
+    if a.kind != JointKind::Revolute || b.kind != JointKind::Revolute {
+        return true;
+    }
+    unsigned_angle(&a.axis, &b.axis) > 45f64.to_radians() || a.line().distance(&b.origin) < 0.3
+}
+
+/// Consensus about `seed`: of the joints of its type those that agree with it (10 degrees, 12 cm) are averaged, directions
+/// by PCA, origins where they pass the seed's.
 #[must_use]
-pub fn merge(members: &[Member], group: &[usize]) -> Option<SceneJoint> {
-    // One overconfident clip must not outvote two others.
-    const MAX_LOG_ODDS: f64 = 3.9;
-    let log_odds: f64 = group
+pub fn consensus(seed: &Articulation, joints: &[(Articulation, f64)]) -> Articulation {
+    let agreeing: Vec<(Articulation, f64)> = joints
         .iter()
-        .map(|&i| {
-            let j = members[i].joint;
-            let p = j.type_probability.clamp(0.5, 1.0 - 1e-9);
-            let odds = (p / (1.0 - p)).ln().min(MAX_LOG_ODDS);
-            if j.joint.kind == JointKind::Revolute { odds } else { -odds }
+        .filter(|(j, w)| {
+            *w > 0.0
+                && j.kind == seed.kind
+                && unsigned_angle(&j.axis, &seed.axis) < 10f64.to_radians()
+                && (j.kind == JointKind::Prismatic || seed.line().distance(&j.origin) < 0.12)
         })
-        .sum();
-    let kind = if log_odds >= 0.0 { JointKind::Revolute } else { JointKind::Prismatic };
-    let of_kind: Vec<&ClipJoint> = group.iter().map(|&i| members[i].joint).filter(|j| j.joint.kind == kind).collect();
-    let weight = |j: &ClipJoint| j.axis_probability / (1.02 - j.axis_probability.min(1.0)) * j.observed_range.max(1e-3);
-    let agrees = |a: &ClipJoint, b: &ClipJoint| {
-        unsigned_angle(&a.joint.axis, &b.joint.axis) < 10f64.to_radians()
-            && (kind == JointKind::Prismatic || a.joint.line().distance(&b.joint.origin) < 0.12)
-    };
-    let support = |seed: &ClipJoint| of_kind.iter().filter(|j| agrees(seed, j)).map(|j| weight(j)).sum::<f64>();
-    let seed = of_kind.iter().max_by(|a, b| support(a).total_cmp(&support(b)))?;
-    let mut consensus: Vec<&ClipJoint> = of_kind.iter().copied().filter(|j| agrees(seed, j)).collect();
-    consensus.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
-    let axis = mean_direction(&consensus.iter().map(|j| (j.joint.axis, weight(j))).collect::<Vec<_>>())?;
-    // The sense by the heavier side of the members.
-    let sense: f64 = consensus.iter().map(|j| j.joint.axis.dot(&axis) * weight(j)).sum();
-    let axis = if sense < 0.0 { -axis } else { axis };
-    let total: f64 = consensus.iter().map(|j| weight(j)).sum();
-    let anchor = consensus.first()?.joint.origin;
-    let origin = consensus.iter().fold(crate::math::Vector::zeros(), |sum, j| {
-        // Hinges are compared where they pass the first one's origin: along the axis an origin is free.
-        let on_axis = if kind == JointKind::Revolute { j.joint.line().project(&anchor) } else { j.joint.origin };
-        sum + on_axis.coords * (weight(j) / total)
+        .copied()
+        .collect();
+    let total: f64 = agreeing.iter().map(|(_, w)| w).sum();
+    let directions: Vec<(Vector, f64)> =
+        std::iter::once((seed.axis, 1e-9)).chain(agreeing.iter().map(|(j, w)| (j.axis, *w))).collect();
+    let (Some(axis), true) = (mean_direction(&directions), total > 0.0) else { return *seed };
+    let origin = agreeing.iter().fold(Vector::zeros(), |sum, (j, w)| {
+        // Along a hinge an origin is free.
+        let here = if seed.kind == JointKind::Revolute { j.line().project(&seed.origin) } else { j.origin };
+        sum + here.coords * (w / total)
     });
-    let grips: Vec<Point> = group.iter().map(|&i| members[i].joint.grip).collect();
-    Some(SceneJoint {
-        joint: Articulation { kind, axis, origin: Point::from(origin) },
-        clips: group.iter().map(|&i| members[i].clip).collect(),
-        grip: crate::math::centroid(&grips)?,
-        type_probability: 1.0 / (1.0 + (-log_odds.abs()).exp()),
-    })
-}
-
-/// Members by clip index, for reports.
-#[must_use]
-pub fn joint_of_clip(joints: &[SceneJoint]) -> BTreeMap<usize, usize> {
-    joints.iter().enumerate().flat_map(|(j, s)| s.clips.iter().map(move |&c| (c, j))).collect()
+    Articulation { kind: seed.kind, axis, origin: Point::from(origin) }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::articulation::Action;
-    use crate::geometry::AxisSource;
-    use crate::math::{Vector, rotation};
+    use crate::math::rotation;
 
-    fn clip(kind: JointKind, tilt: f64, origin: Point, grip: Point, action: Action, p: f64) -> ClipJoint {
-        ClipJoint {
-            joint: Articulation { kind, axis: rotation(&Vector::x(), tilt) * Vector::z(), origin },
-            contact_pivot: origin,
-            source: AxisSource::Line,
-            type_probability: p,
-            axis_probability: 0.9,
-            residual_m: 0.01,
-            inliers: 1.0,
-            radius_m: None,
-            observed_range: 1.0,
-            grip,
-            action,
+    fn hinge(tilt: f64, x: f64) -> Articulation {
+        Articulation {
+            kind: JointKind::Revolute,
+            axis: rotation(&Vector::x(), tilt) * Vector::z(),
+            origin: Point::new(x, 0.0, 3.0 * x),
         }
     }
 
     #[test]
-    fn an_outlier_does_not_move_the_merged_hinge() {
-        let grip = Point::new(0.5, 0.0, 1.0);
-        let clips = [
-            clip(JointKind::Revolute, 0.02, Point::new(0.01, 0.0, 0.2), grip, Action::Open, 0.9),
-            clip(JointKind::Revolute, -0.02, Point::new(-0.01, 0.0, 1.7), grip, Action::Close, 0.9),
-            clip(JointKind::Revolute, 0.0, Point::new(0.6, 0.0, 1.0), grip, Action::Open, 0.9),
-            clip(JointKind::Prismatic, 0.0, grip, grip, Action::Close, 0.7),
+    fn an_outlier_does_not_move_the_consensus() {
+        let joints = [
+            (hinge(0.02, 0.01), 1.0),
+            (hinge(-0.02, -0.01), 1.0),
+            (hinge(0.0, 0.6), 1.0),
+            (Articulation { kind: JointKind::Prismatic, ..hinge(0.0, 0.0) }, 5.0),
         ];
-        let members: Vec<Member> =
-            clips.iter().enumerate().map(|(i, j)| Member { clip: i, joint: j, face: None }).collect();
-        let groups = group(&members, &config::Inference::default());
-        assert_eq!(groups, [vec![0, 1, 2, 3]]);
-        let merged = merge(&members, &groups[0]).unwrap();
-        assert_eq!(merged.joint.kind, JointKind::Revolute);
-        assert!(merged.joint.line().distance(&Point::new(0.0, 0.0, 1.0)) < 0.03, "{merged:?}");
+        let merged = consensus(&joints[0].0, &joints);
+        assert!(unsigned_angle(&merged.axis, &Vector::z()) < 1e-3);
+        assert!(merged.line().distance(&Point::origin()) < 2e-3, "{merged:?}");
+    }
+
+    fn held(action: Action, closed: [f64; 3], open: [f64; 3]) -> Held {
+        let (closed, open) = (Point::from(closed), Point::from(open));
+        Held { action, closed, open, normal: Some(Vector::y()), kind: None, part: None, joint: None }
     }
 
     #[test]
     fn drawers_of_a_stack_stay_apart() {
         let clips = [
-            clip(JointKind::Prismatic, 0.0, Point::origin(), Point::new(0.0, 0.0, 0.7), Action::Open, 0.9),
-            clip(JointKind::Prismatic, 0.0, Point::origin(), Point::new(0.0, 0.0, 0.5), Action::Open, 0.9),
-            clip(JointKind::Prismatic, 0.0, Point::origin(), Point::new(0.0, 0.02, 0.52), Action::Close, 0.9),
+            held(Action::Open, [0.0, 0.0, 0.7], [0.0, 0.4, 0.7]),
+            held(Action::Open, [0.0, 0.0, 0.5], [0.0, 0.4, 0.5]),
+            held(Action::Close, [0.0, 0.02, 0.52], [0.0, 0.38, 0.5]),
+            held(Action::Close, [0.0, 0.02, 0.69], [0.0, 0.4, 0.7]),
         ];
-        let members: Vec<Member> =
-            clips.iter().enumerate().map(|(i, j)| Member { clip: i, joint: j, face: None }).collect();
-        assert_eq!(group(&members, &config::Inference::default()), [vec![0], vec![1, 2]]);
+        assert_eq!(group(&clips, &config::Inference::default()), [vec![0, 3], vec![1, 2]]);
+    }
+
+    #[test]
+    fn a_closing_whose_end_was_not_seen_belongs_to_the_opening_before_it() {
+        let clips = [
+            held(Action::Open, [0.0, 0.0, 0.7], [0.3, 0.4, 0.7]),
+            held(Action::Close, [0.25, 0.3, 0.7], [0.31, 0.42, 0.72]),
+        ];
+        assert_eq!(group(&clips, &config::Inference::default()), [vec![0, 1]]);
     }
 }

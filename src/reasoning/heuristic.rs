@@ -26,14 +26,14 @@ impl Reasoner for Geometric {
     }
 
     fn answer(&self, question: &Question) -> Answer {
+        let priors = log_priors(question);
         let log_weights: Vec<f64> = question
             .candidates
             .iter()
             .zip(question.agreement)
-            .map(|(candidate, agreement)| {
-                self.path_log_likelihood(candidate, question)
-                    + depth_log_likelihood(*agreement)
-                    + log_prior(candidate, question)
+            .zip(priors)
+            .map(|((candidate, agreement), prior)| {
+                self.path_log_likelihood(candidate, question) + depth_log_likelihood(*agreement) + prior
             })
             .collect();
         let mass = |kind: JointKind| -> f64 {
@@ -100,8 +100,28 @@ fn depth_log_likelihood((share, count): (f64, usize)) -> f64 {
     weight * (share * (RIGHT / WRONG).ln() + (1.0 - share) * ((1.0 - RIGHT) / (1.0 - WRONG)).ln())
 }
 
-fn log_prior(candidate: &AxisCandidate, question: &Question) -> f64 {
-    let source: f64 = match candidate.source {
+/// Prior of each candidate: that of its source, shared among the candidates of that source (thirty lines are not thirty
+/// times as likely to hold the hinge as three), times that of its place on the part.
+fn log_priors(question: &Question) -> Vec<f64> {
+    let candidates = question.candidates;
+    // Lines that are long and seen often are edges of furniture rather than of its texture.
+    let raw = |c: &AxisCandidate| match c.source {
+        AxisSource::Line => (c.length_m + 0.05).sqrt() * (c.views as f64).sqrt(),
+        _ => 1.0,
+    };
+    candidates
+        .iter()
+        .map(|c| {
+            let same = |o: &&AxisCandidate| o.source == c.source && o.joint.kind == c.joint.kind;
+            let total: f64 = candidates.iter().filter(same).map(raw).sum();
+            let share = (raw(c) / total.max(1e-12)).ln();
+            source_prior(c.source).ln() + share + question.part.map_or(0.0, |part| shape_log_prior(c, &part))
+        })
+        .collect()
+}
+
+fn source_prior(source: AxisSource) -> f64 {
+    match source {
         AxisSource::Line => 0.5,
         AxisSource::PartEdge => 0.35,
         AxisSource::FaceEdge => 0.1,
@@ -111,8 +131,7 @@ fn log_prior(candidate: &AxisCandidate, question: &Question) -> f64 {
         // Where the face is known its own axes come first; without a face the room's are all there is.
         AxisSource::Manhattan => 0.1,
         AxisSource::HandPath => 0.04,
-    };
-    source.ln() + question.part.map_or(0.0, |part| shape_log_prior(candidate, &part))
+    }
 }
 
 /// Where the grip sits and how wide the front is, under each kind of joint.
