@@ -297,6 +297,8 @@ fn infer_clip(
         },
         &config.inference,
     );
+    let paths = [path.clone()];
+    result.candidates = result.candidates.iter().map(|c| candidates::settled(c, &paths, &config.reasoning)).collect();
     let agreement: Vec<(f64, usize)> = result
         .candidates
         .iter()
@@ -468,7 +470,12 @@ fn merge_group(
     let face = clips[best].face;
     let (mut joint, mut type_probability) = (best_joint.joint, best_joint.type_probability);
     if group.len() > 1 {
-        let pooled = pooled(clips, group, best, &grip, &config.inference);
+        let paths: Vec<Vec<Point>> =
+            group.iter().filter_map(|&c| clips[c].trajectory.as_ref()).map(Trajectory::positions).collect();
+        let pooled: Vec<AxisCandidate> = pooled(clips, group, best, &grip, &config.inference)
+            .iter()
+            .map(|c| candidates::settled(c, &paths, &config.reasoning))
+            .collect();
         let mut weights = vec![0.0; pooled.len()];
         let mut log_odds = 0.0;
         for &c in group {

@@ -20,7 +20,7 @@ const SEED: u64 = 7;
 pub fn run(args: &DemoArgs) -> anyhow::Result<Answer> {
     let (recording, twin) = (args.out.join("kitchen"), args.out.join("twin"));
     eprintln!("rendering a recording of a kitchen into {} ...", recording.display());
-    super::synth::write(&crate::synth::Options { seed: SEED, width: 480, ..Default::default() }, &recording)?;
+    super::synth::write(&crate::synth::Options { seed: SEED, width: 480, parts: 6, ..Default::default() }, &recording)?;
     eprintln!("making its twin ...");
     twin::make(&recording, &twin, &Config::default(), true)
 }

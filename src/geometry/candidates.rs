@@ -58,6 +58,54 @@ pub struct AxisCandidate {
     pub views: usize,
     /// Length of the line, for lines and edges, metres.
     pub length_m: f64,
+    /// How far the hand's path has moved a hinge from where its source put it, in standard deviations of the source.
+    pub shift: f64,
+}
+
+impl AxisSource {
+    /// How well the source places a hinge across its axis, metres.
+    #[must_use]
+    pub fn position_std_m(self) -> f64 {
+        match self {
+            // Depth scale and unprojection.
+            Self::Line => 0.03,
+            // Next to a hinge a door hardly moves, so the outline ends a few centimetres short of it.
+            Self::PartEdge => 0.06,
+            Self::FaceEdge => 0.08,
+            // The fit itself.
+            _ => 0.2,
+        }
+    }
+}
+
+/// Moves a hinge across its axis to where the paths of the hand and the hinge's source agree best. Slides stay as they are.
+#[must_use]
+pub fn settled(candidate: &AxisCandidate, paths: &[Vec<Point>], reasoning: &config::Reasoning) -> AxisCandidate {
+    if candidate.joint.kind == JointKind::Prismatic {
+        return candidate.clone();
+    }
+    let axis = candidate.joint.axis;
+    let e1 = crate::math::any_orthogonal(&axis);
+    let e2 = axis.cross(&e1);
+    let origin = candidate.joint.origin;
+    let arcs: Vec<Vec<Point2<f64>>> = paths
+        .iter()
+        .map(|path| path.iter().map(|p| Point2::new((p - origin).dot(&e1), (p - origin).dot(&e2))).collect())
+        .collect();
+    let std_m = candidate.source.position_std_m();
+    let prior = circle::CenterPrior {
+        center: Point2::origin(),
+        std_m,
+        point_std_m: reasoning.hand_std_m,
+        effective_samples: reasoning.effective_samples,
+    };
+    let center = circle::common_center(&arcs, &prior);
+    // Farther than that it is another hinge, which has its own candidate.
+    if !center.coords.norm().is_finite() || center.coords.norm() > 3.0 * std_m {
+        return candidate.clone();
+    }
+    let joint = Articulation { origin: origin + e1 * center.x + e2 * center.y, ..candidate.joint };
+    AxisCandidate { joint, shift: center.coords.norm() / std_m, ..candidate.clone() }
 }
 
 /// What the candidates are made from.
@@ -118,6 +166,7 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
                 side: Some(side_of(if upright { right } else { up }, upright)),
                 views: track.views.len(),
                 length_m: track.segment.length(),
+                shift: 0.0,
             });
         }
         let edges = [
@@ -136,6 +185,7 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
                 side: Some(side),
                 views: 0,
                 length_m,
+                shift: 0.0,
             }));
         }
     } else {
@@ -151,6 +201,7 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
                 side: None,
                 views: track.views.len(),
                 length_m: track.segment.length(),
+                shift: 0.0,
             });
         }
     }
@@ -161,7 +212,7 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
     for direction in directions {
         if let Some(joint) = arc_about(evidence.path, &direction) {
             let side = evidence.face.map(|face| side_at(face, &direction, &joint.origin));
-            out.push(AxisCandidate { joint, source: AxisSource::HandArc, side, views: 0, length_m: 0.0 });
+            out.push(AxisCandidate { joint, source: AxisSource::HandArc, side, views: 0, length_m: 0.0, shift: 0.0 });
         }
     }
 }
@@ -201,7 +252,7 @@ fn slides(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
     let origin = evidence.path.first().copied().unwrap_or(evidence.grip);
     let mut push = |axis: Vector, source: AxisSource| {
         let joint = Articulation { kind: JointKind::Prismatic, axis, origin };
-        out.push(AxisCandidate { joint, source, side: None, views: 0, length_m: 0.0 });
+        out.push(AxisCandidate { joint, source, side: None, views: 0, length_m: 0.0, shift: 0.0 });
     };
     if let Some(face) = evidence.face.filter(|_| config.use_face_normal) {
         push(face.normal, AxisSource::FaceNormal);

@@ -68,6 +68,53 @@ pub fn fit(points: &[Point2<f64>]) -> Option<Circle> {
     (radius > 0.0).then(|| Circle { center: Point2::from(center + mean), radius })
 }
 
+/// How far the common centre of several arcs may lie from where it is expected.
+#[derive(Debug, Clone, Copy)]
+pub struct CenterPrior {
+    /// Expected centre.
+    pub center: Point2<f64>,
+    /// Its standard deviation, metres.
+    pub std_m: f64,
+    /// Standard deviation of the points about their circles, metres.
+    pub point_std_m: f64,
+    /// Independent samples that one arc is worth (errors of neighbouring points are correlated).
+    pub effective_samples: f64,
+}
+
+/// Most probable common centre of arcs that may each have a radius of their own: Gauss-Newton on heavy-tailed radial
+/// residuals (Student, 4 degrees of freedom) and the prior.
+#[must_use]
+pub fn common_center(arcs: &[Vec<Point2<f64>>], prior: &CenterPrior) -> Point2<f64> {
+    const FREEDOM: f64 = 4.0;
+    let mut center = prior.center;
+    for _ in 0..15 {
+        let precision = prior.std_m.powi(-2);
+        let mut h = nalgebra::Matrix2::identity() * precision;
+        let mut g = (center - prior.center) * precision;
+        for arc in arcs.iter().filter(|a| !a.is_empty()) {
+            let n = arc.len() as f64;
+            let rays: Vec<Vector2<f64>> = arc.iter().map(|p| p - center).collect();
+            let distances: Vec<f64> = rays.iter().map(|r| r.norm().max(1e-6)).collect();
+            let radius = crate::math::stats::median(&distances).unwrap_or(0.0);
+            let mean_ray = rays.iter().zip(&distances).fold(Vector2::zeros(), |s, (r, d)| s + r / *d) / n;
+            let each = prior.effective_samples.min(n) / n / prior.point_std_m.powi(2);
+            for (ray, d) in rays.iter().zip(&distances) {
+                let e = d - radius;
+                let weight = each * (FREEDOM + 1.0) / (FREEDOM + (e / prior.point_std_m).powi(2));
+                let j = mean_ray - ray / *d;
+                h += j * j.transpose() * weight;
+                g += j * (e * weight);
+            }
+        }
+        let Some(step) = h.try_inverse().map(|inverse| inverse * g) else { break };
+        center -= step;
+        if step.norm() < 1e-6 {
+            break;
+        }
+    }
+    center
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -92,5 +139,17 @@ mod tests {
     fn a_straight_line_has_no_circle_of_furniture_size() {
         let line: Vec<_> = (0..20).map(|i| Point2::new(f64::from(i) * 0.01, 0.0)).collect();
         assert!(fit(&line).is_none_or(|c| c.radius > 100.0));
+    }
+
+    #[test]
+    fn a_wide_arc_corrects_the_expected_centre_and_a_short_one_leaves_it() {
+        let prior =
+            CenterPrior { center: Point2::new(1.07, -2.0), std_m: 0.06, point_std_m: 0.02, effective_samples: 8.0 };
+        let off = |degrees: f64| {
+            (common_center(&[arc(0.5, degrees), arc(0.45, degrees)], &prior) - Point2::new(1.0, -2.0)).norm()
+        };
+        assert!(off(90.0) < 0.02, "{}", off(90.0));
+        assert!(off(5.0) > 0.06, "{}", off(5.0));
+        assert!((common_center(&[], &prior) - prior.center).norm() < 1e-12);
     }
 }

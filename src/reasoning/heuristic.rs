@@ -115,7 +115,8 @@ fn log_priors(question: &Question) -> Vec<f64> {
             let same = |o: &&AxisCandidate| o.source == c.source && o.joint.kind == c.joint.kind;
             let total: f64 = candidates.iter().filter(same).map(raw).sum();
             let share = (raw(c) / total.max(1e-12)).ln();
-            source_prior(c.source).ln() + share + question.part.map_or(0.0, |part| shape_log_prior(c, &part))
+            source_prior(c.source).ln() + share - 0.5 * c.shift * c.shift
+                + question.part.map_or(0.0, |part| shape_log_prior(c, &part))
         })
         .collect()
 }
@@ -176,7 +177,14 @@ mod tests {
     use crate::recording::narration::Reading;
 
     fn candidate(kind: JointKind, axis: Vector, origin: Point, source: AxisSource) -> AxisCandidate {
-        AxisCandidate { joint: Articulation { kind, axis, origin }, source, side: None, views: 0, length_m: 0.5 }
+        AxisCandidate {
+            joint: Articulation { kind, axis, origin },
+            source,
+            side: None,
+            views: 0,
+            length_m: 0.5,
+            shift: 0.0,
+        }
     }
 
     fn ask(

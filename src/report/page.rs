@@ -71,7 +71,7 @@ pub fn render(
                 axis: words::axis(&f.part, joint.and_then(|j| j.face.as_ref())),
                 range: words::amount(f.part.joint.articulation.kind, f.part.joint.upper),
                 source: joint.map_or(String::new(), |j| {
-                    format!("{} clips, type {:.0} % sure", j.clips.len(), 100.0 * j.type_probability)
+                    format!("{} clips, type {} sure", j.clips.len(), words::sure(j.type_probability))
                 }),
                 tracking: words::centimetres(check.rms_m),
                 force: format!("{:.0} N", check.peak_force_n),

@@ -20,6 +20,12 @@ pub fn centimetres(metres: f64) -> String {
     if metres.abs() < 0.1 { format!("{:.1} cm", 100.0 * metres) } else { format!("{:.0} cm", 100.0 * metres) }
 }
 
+/// A probability for people; nothing that was estimated is certain.
+#[must_use]
+pub fn sure(probability: f64) -> String {
+    if probability > 0.99 { "over 99 %".to_owned() } else { format!("{:.0} %", 100.0 * probability) }
+}
+
 /// Where the axis is, seen by the person: "upright, on the left".
 #[must_use]
 pub fn axis(part: &Part, face: Option<&Face>) -> String {
@@ -61,9 +67,9 @@ pub fn clip_reason(clip: &ClipResult) -> String {
     match &clip.joint {
         Outcome::Abstained(reason) => reason.clone(),
         Outcome::Found(j) => format!(
-            "{} ({:.0} % sure), axis from {}, moved {}, hand within {} of its path",
+            "{} ({} sure), axis from {}, moved {}, hand within {} of its path",
             j.joint.kind.word(),
-            100.0 * j.type_probability,
+            sure(j.type_probability),
             source(j.source),
             amount(j.joint.kind, j.observed_range),
             centimetres(j.residual_m)
