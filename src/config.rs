@@ -132,14 +132,20 @@ block! {
 block! {
     /// The motion type and the plausible hinges (§3.3, §A.6).
     Reasoning, "reasoning", {
-        /// Lines offered to the reasoner per clip.
-        candidates: usize = 4, "-", "B.1";
+        /// Frames of a clip shown to a language model for the motion type (the geometric heuristic looks at none).
+        vlm_frames: usize = 10, "frames", "B.1";
+        /// Longest projected lines per view offered to a language model (the geometric heuristic weighs all).
+        vlm_lines_per_view: usize = 4, "lines", "B.1";
+        /// Sampling temperature of a language model.
+        vlm_temperature: f64 = 0.5, "-", "B.1";
+        /// Nucleus of a language model.
+        vlm_top_p: f64 = 0.3, "-", "B.1";
         /// How often the furniture's name tells the motion type rightly.
         name_accuracy: f64 = 0.9, "share", "ours";
         /// Independent samples in one recorded motion: errors of neighbouring frames are correlated.
         effective_samples: f64 = 8.0, "-", "ours";
         /// Noise of a smoothed hand position when two explanations of it are compared.
-        hand_std_m: f64 = 0.02, "m", "ours";
+        hand_std_m: f64 = 0.03, "m", "ours";
     }
 }
 
@@ -168,7 +174,7 @@ block! {
         merge_clips: bool = true, "-", "C.2";
         /// Clips whose closed grips are nearer than this can be one joint.
         merge_grip_m: f64 = 0.15, "m", "ours";
-        /// Clips whose axes differ by less than this can be one joint.
+        /// Clips whose front faces differ by less than this can be one joint.
         merge_angle_deg: f64 = 25.0, "deg", "ours";
     }
 }
@@ -207,7 +213,7 @@ block! {
         /// The most a person's arm pulls.
         hand_force_max_n: f64 = 150.0, "N", "ours";
         /// Tracking error up to which a motion counts as explained: a right joint shows 2 to 5 cm of it under the errors
-        /// of estimated hands.
+        /// of estimated hands. Up to twice as much decides nothing, more refutes the joint.
         pass_rms_m: f64 = 0.05, "m", "ours";
         /// Share of the observed range that the simulated joint must reach.
         pass_range_share: f64 = 0.8, "share", "ours";
@@ -292,8 +298,9 @@ impl Config {
             if !value.is_finite() || value < 0.0 || (value == 0.0 && !zero_is_fine.contains(&row.key.as_str())) {
                 return Err(format!("{} = {} must be a positive finite number ({})", row.key, row.value, row.unit));
             }
-            if row.unit == "share" && value >= 1.0 {
-                return Err(format!("{} = {} must be below 1", row.key, row.value));
+            let [low, high] = sensible(&row);
+            if value != 0.0 && !(low..=high).contains(&value) {
+                return Err(format!("{} = {} must lie between {low} and {high} ({})", row.key, row.value, row.unit));
             }
         }
         if self.inference.torus_tolerance_min_m > self.inference.torus_tolerance_max_m {
@@ -303,6 +310,24 @@ impl Config {
             return Err("localization.min_views is above local_frames: no voxel could ever be confident".to_owned());
         }
         Ok(())
+    }
+}
+
+/// Bounds beyond which a value is a slip of the hand, and would cost memory or time without end.
+fn sensible(row: &Row) -> [f64; 2] {
+    match (row.key.as_str(), row.unit) {
+        ("fitting.clearance_m" | "fitting.board_m", _) => [1e-4, 0.1],
+        ("fitting.cell_m" | "localization.voxel_m", _) => [2e-3, 1.0],
+        ("fitting.carcass_depth_m", _) => [0.15, 5.0],
+        ("validation.step_secs", _) => [1e-4, 0.02],
+        (_, "share") => [1e-9, 1.0 - 1e-9],
+        (_, "m") => [1e-4, 100.0],
+        (_, "s") => [1e-3, 100.0],
+        (_, "deg") => [1e-2, 180.0],
+        (_, "px" | "frames" | "views" | "samples" | "lines") => [1.0, 1e4],
+        ("geometry.points_per_view" | "geometry.normals_per_frame", _) => [100.0, 1e6],
+        (_, "-") => [1e-3, 1e4],
+        _ => [1e-6, 1e6],
     }
 }
 
@@ -329,7 +354,10 @@ mod tests {
             ("localization.min_views", "4"),
             ("localization.local_frames", "5"),
             ("localization.global_views", "50"),
-            ("reasoning.candidates", "4"),
+            ("reasoning.vlm_frames", "10"),
+            ("reasoning.vlm_lines_per_view", "4"),
+            ("reasoning.vlm_temperature", "0.5"),
+            ("reasoning.vlm_top_p", "0.3"),
             ("inference.torus_tolerance_ratio", "0.15"),
             ("inference.torus_tolerance_min_m", "0.015"),
             ("inference.torus_tolerance_max_m", "0.05"),

@@ -387,8 +387,10 @@ fn merge(
     config: &Config,
 ) -> Result<Vec<SceneJoint>> {
     // Clips with a hand take part even where they have no answer of their own: what they show counts.
-    let seen: Vec<(usize, &ClipResult, &Trajectory)> =
+    let mut seen: Vec<(usize, &ClipResult, &Trajectory)> =
         clips.iter().enumerate().filter_map(|(i, c)| c.trajectory.as_ref().map(|t| (i, c, t))).collect();
+    // Clips may be listed in any order; people open before they close.
+    seen.sort_by_key(|(i, c, _)| (c.clip.start_frame, *i));
     let held: Vec<aggregate::Held> = seen
         .iter()
         .map(|(_, clip, trajectory)| aggregate::Held {
@@ -459,10 +461,13 @@ fn merge_group(
         let (Some(face), Some(region)) = (&clip.face, &clip.region) else { return 0.0 };
         let standoff = face.coordinates(&region.grip)[2];
         let held = (-0.5 * ((standoff - config.geometry.grip_standoff_m) / 0.05).powi(2)).exp();
-        let found = if clip.joint.found().is_some() { 1.0 } else { 0.1 };
-        found * held * (0.2 + face.support) * if clip.part.is_some() { 2.0 } else { 1.0 }
+        held * (0.2 + face.support) * if clip.part.is_some() { 2.0 } else { 1.0 }
     };
-    let Some(&best) = group.iter().max_by(|&&a, &&b| trust(a).total_cmp(&trust(b)).then(b.cmp(&a))) else {
+    let Some(&best) = group
+        .iter()
+        .filter(|&&c| clips[c].joint.found().is_some())
+        .max_by(|&&a, &&b| trust(a).total_cmp(&trust(b)).then(b.cmp(&a)))
+    else {
         return Ok(None);
     };
     let Some(best_joint) = clips[best].joint.found() else { return Ok(None) };
@@ -476,8 +481,7 @@ fn merge_group(
             .iter()
             .map(|c| candidates::settled(c, &paths, &config.reasoning))
             .collect();
-        let mut weights = vec![0.0; pooled.len()];
-        let mut log_odds = 0.0;
+        let mut answers = Vec::new();
         for &c in group {
             let Some(trajectory) = &clips[c].trajectory else { continue };
             let open = moved::open_views(recording, &clips[c].clip, trajectory)?;
@@ -489,22 +493,19 @@ fn merge_group(
                         .map_or((0.0, 0), |f| moved::agreement(f, clips[best].part.as_ref(), &k.joint, &grip, &open))
                 })
                 .collect();
-            let answer = reasoner.answer(&Question {
+            answers.push(reasoner.answer(&Question {
                 reading: &narration::read(&clips[c].clip),
                 path: &path,
                 grip,
                 candidates: &pooled,
                 agreement: &agreement,
                 part: clips[best].part.as_ref().map(part_shape),
-            });
-            for (sum, w) in weights.iter_mut().zip(&answer.log_weights) {
-                *sum += w;
-            }
-            let p = answer.revolute_probability.clamp(1e-9, 1.0 - 1e-9);
-            // One overconfident clip must not outvote two others.
-            log_odds += (p / (1.0 - p)).ln().clamp(-3.9, 3.9);
+            }));
         }
-        let revolute = log_odds >= 0.0;
+        let Some(answer) = Answer::together(&answers) else { return Ok(None) };
+        let weights = answer.log_weights();
+        let revolute_probability = answer.revolute_probability(&pooled);
+        let revolute = revolute_probability >= 0.5;
         let of_kind = |k: &AxisCandidate| (k.joint.kind == crate::articulation::JointKind::Revolute) == revolute;
         let top = (0..pooled.len())
             .filter(|&i| of_kind(&pooled[i]) && weights[i].is_finite())
@@ -513,7 +514,7 @@ fn merge_group(
             let all: Vec<(Articulation, f64)> =
                 pooled.iter().zip(&weights).map(|(k, w)| (k.joint, (w - weights[top]).exp())).collect();
             joint = aggregate::consensus(&pooled[top].joint, &all);
-            type_probability = 1.0 / (1.0 + (-log_odds.abs()).exp());
+            type_probability = revolute_probability.max(1.0 - revolute_probability);
         }
     }
     let trajectories = || group.iter().filter_map(|&c| clips[c].trajectory.as_ref());

@@ -14,7 +14,14 @@ use crate::twin::Twin;
 
 pub fn write(recording: &Recording, scene: &Scene, twin: &Twin, output: &Output) -> anyhow::Result<()> {
     for clip in &scene.clips {
-        let folder = format!("steps/{}", clip.clip.clip);
+        // A clip's name may be anything; a folder's may not.
+        let name: String = clip
+            .clip
+            .clip
+            .chars()
+            .map(|c| if c.is_alphanumeric() || matches!(c, '-' | '_' | '.') { c } else { '_' })
+            .collect();
+        let folder = format!("steps/{}", if name.trim_matches('.').is_empty() { "clip" } else { &name });
         output.write(&format!("{folder}/clip.json"), json::text(clip)?)?;
         if let Some(trajectory) = &clip.trajectory {
             let mut text = String::from("frame,time_secs,observed_x,observed_y,observed_z,x,y,z,accepted\n");

@@ -4,21 +4,46 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 
-/// A file that marks a folder as one of ours.
-const MARKER: &str = ".paws";
+/// What a folder of ours holds: only a folder of the same kind is replaced.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A twin.
+    Twin,
+    /// A synthetic recording.
+    Recording,
+}
+
+impl Kind {
+    /// The file that marks such a folder.
+    fn marker(self) -> &'static str {
+        match self {
+            Self::Twin => ".paws-twin",
+            Self::Recording => ".paws-recording",
+        }
+    }
+}
 
 /// A folder that is written beside its place and moved there when it is complete.
 pub struct Output {
     target: PathBuf,
     staging: PathBuf,
+    kind: Kind,
     done: bool,
 }
 
 impl Output {
-    /// Prepares to write `target`. An existing folder is replaced only if this program made it, or if it is empty.
-    pub fn new(target: &Path) -> anyhow::Result<Self> {
+    /// Prepares to write `target`. An existing folder is replaced only if this program made it as the same kind, or if it
+    /// is empty; never if it is, or contains, one of the `inputs`.
+    pub fn new(target: &Path, kind: Kind, inputs: &[&Path]) -> anyhow::Result<Self> {
+        if let Ok(out) = target.canonicalize() {
+            for input in inputs {
+                if input.canonicalize().is_ok_and(|i| i.starts_with(&out)) {
+                    bail!("{}: is or contains the input {}; choose another --out", target.display(), input.display());
+                }
+            }
+        }
         if target.exists() {
-            let ours = target.join(MARKER).is_file();
+            let ours = target.join(kind.marker()).is_file();
             let empty = target.is_dir() && std::fs::read_dir(target).is_ok_and(|mut d| d.next().is_none());
             if !ours && !empty {
                 bail!(
@@ -32,7 +57,7 @@ impl Output {
         std::fs::create_dir_all(parent).with_context(|| parent.display().to_string())?;
         let staging = parent.join(format!(".{name}.partial-{}", std::process::id()));
         std::fs::create_dir_all(&staging).with_context(|| staging.display().to_string())?;
-        Ok(Self { target: target.to_owned(), staging, done: false })
+        Ok(Self { target: target.to_owned(), staging, kind, done: false })
     }
 
     /// Writes one file, creating folders on the way.
@@ -44,6 +69,9 @@ impl Output {
     /// The staged path of a file, its folder made.
     pub fn path(&self, name: &str) -> anyhow::Result<PathBuf> {
         let path = self.staging.join(name);
+        if name.split('/').any(|part| part.is_empty() || part == "..") {
+            bail!("{name}: not a name for a file of the output");
+        }
         if let Some(dir) = path.parent() {
             std::fs::create_dir_all(dir).with_context(|| dir.display().to_string())?;
         }
@@ -52,7 +80,7 @@ impl Output {
 
     /// Moves the folder to its place.
     pub fn finish(mut self) -> anyhow::Result<()> {
-        self.write(MARKER, "made by paws; replaced as a whole when the command runs again\n")?;
+        self.write(self.kind.marker(), "made by paws; replaced as a whole when the command runs again\n")?;
         if self.target.exists() {
             std::fs::remove_dir_all(&self.target).with_context(|| self.target.display().to_string())?;
         }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::output::Output;
+use super::output::{Kind, Output};
 use super::progress::Steps;
 use super::{Answer, print, shown};
 use crate::synth::{self, Options, Tier};
@@ -37,7 +37,7 @@ pub fn run(args: &SynthArgs) -> anyhow::Result<Answer> {
 
 /// Renders a recording into a folder.
 pub fn write(options: &Options, out: &Path) -> anyhow::Result<()> {
-    let output = Output::new(out)?;
+    let output = Output::new(out, Kind::Recording, &[])?;
     let recording = synth::Recorded::new(options)?;
     for (name, text) in recording.tables()? {
         output.write(&name, text)?;

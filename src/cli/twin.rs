@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::output::Output;
+use super::output::{Kind, Output};
 use super::progress::Steps;
 use super::{Answer, ConfigFile, keep, print, shown};
 use crate::config::Config;
@@ -94,8 +94,8 @@ pub fn reasoner(config: &Config) -> Geometric {
 
 pub fn make(recording: &Path, out: &Path, config: &Config, keep_steps: bool) -> anyhow::Result<Answer> {
     let begin = Instant::now();
+    let output = Output::new(out, Kind::Twin, &[recording])?;
     let recording = Recording::open(recording)?;
-    let output = Output::new(out)?;
     let steps = Steps::new();
     let reasoner = reasoner(config);
     let scene = pipeline::infer(&recording, config, &Lsd, &reasoner, &|s, d, t| steps.report(s, d, t))?;
@@ -164,7 +164,7 @@ pub fn summary(scene: &Scene, twin: &Twin, validation: &Validation) -> String {
             check.verdict.word().to_owned(),
         ]);
         if check.verdict != Verdict::Pass {
-            reasons += &format!("{}: {}, because {}\n", check.id, check.verdict.word(), check.reason);
+            reasons += &format!("{}: {}: {}\n", check.id, check.verdict.word(), check.reason);
         }
     }
     let mut text = format!("{}\n\n", scene.recording);
@@ -174,7 +174,7 @@ pub fn summary(scene: &Scene, twin: &Twin, validation: &Validation) -> String {
         text += &aligned(&rows);
     }
     for left in &twin.left_out {
-        reasons += &format!("{}: not built, because {}\n", left.id, left.reason);
+        reasons += &format!("{}: not built: {}\n", left.id, left.reason);
     }
     if !reasons.is_empty() {
         text += &format!("\n{reasons}");

@@ -30,6 +30,11 @@ pub fn run(args: &ValidateArgs) -> anyhow::Result<Answer> {
     // The same points that every exporter insists on: a broken twin is told before it is simulated.
     crate::export::check(&twin)?;
     let hands: Vec<JointHands> = json::read(&args.twin.join("trajectories.json"))?;
+    for (name, trajectory) in hands.iter().flat_map(|h| &h.clips) {
+        if let Err(fault) = trajectory.check() {
+            anyhow::bail!("{}: clip {name}: {fault}", args.twin.join("trajectories.json").display());
+        }
+    }
     let in_order: Vec<JointHands> = twin
         .furniture
         .iter()

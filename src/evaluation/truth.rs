@@ -58,8 +58,19 @@ impl Predictions {
     /// Reads a file and checks its rows.
     pub fn read(path: &Path) -> Result<Self> {
         let mut all: Self = json::read(path)?;
+        let mut seen = std::collections::BTreeSet::new();
         for (i, p) in all.predictions.iter_mut().enumerate() {
             let place = format!("predictions[{i}] ({}/{})", p.recording, p.clip);
+            if !seen.insert((p.recording.clone(), p.clip.clone())) {
+                return Err(Error::format(path, place, "this clip has a row already; one row a clip"));
+            }
+            if let Some(b) = &p.part_box {
+                let orthonormal = (b.rotation.transpose() * b.rotation - nalgebra::Matrix3::identity()).norm() < 1e-3;
+                if !orthonormal || !b.half.iter().all(|h| h.is_finite() && *h > 0.0) {
+                    let message = "part_box: half sizes must be positive, the columns of R orthonormal";
+                    return Err(Error::format(path, place, message));
+                }
+            }
             if p.kind.is_none() {
                 continue;
             }

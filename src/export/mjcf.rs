@@ -98,16 +98,22 @@ fn defaults(xml: &mut Xml) -> std::io::Result<()> {
 }
 
 fn worldbody(xml: &mut Xml, twin: &Twin) -> std::io::Result<()> {
+    // Everywhere that anything can be: a dishwasher's door reaches below its furniture when it is open.
+    let opened = |part: &crate::twin::Part| {
+        let motions: Vec<_> =
+            (0..=8).map(|i| part.joint.articulation.motion(part.joint.upper * f64::from(i) / 8.0)).collect();
+        let moved = |s: &Solid| motions.iter().flat_map(|m| s.shape.moved(m).corners()).collect::<Vec<_>>();
+        part.solids.iter().flat_map(moved).collect::<Vec<_>>()
+    };
     let corners: Vec<Point> = twin
         .furniture
         .iter()
-        .flat_map(|f| f.carcass.iter().chain(&f.part.solids))
-        .flat_map(|s| s.shape.corners())
+        .flat_map(|f| f.carcass.iter().flat_map(|s| s.shape.corners()).chain(opened(&f.part)))
         .collect();
     let low = corners.iter().map(|c| c.z).fold(f64::INFINITY, f64::min);
     let high = corners.iter().map(|c| c.z).fold(f64::NEG_INFINITY, f64::max);
     let middle = crate::math::centroid(&corners).unwrap_or(Point::origin());
-    // The recording does not tell the floor: just under the lowest board.
+    // The recording does not tell the floor: just under the lowest point.
     let floor = if low.is_finite() { low - 0.01 } else { 0.0 };
     let top = if high.is_finite() { high + 2.0 } else { 3.0 };
     xml.create_element("worldbody").write_inner_content(|xml| {

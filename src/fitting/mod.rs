@@ -64,13 +64,12 @@ fn place(plan: &Plan, placed: &[(usize, Furniture)], config: &config::Fitting) -
     let free = |f: &Furniture| !placed.iter().any(|(_, other)| overlap::furniture(other, f));
     for share in [1.0, 0.85, 0.7] {
         let plan = Plan { rect: shrunk(plan, share), ..plan.clone() };
-        let mut depth = config.carcass_depth_m;
-        while depth > 0.1 {
-            let piece = build(&plan, depth, config);
+        let steps = ((config.carcass_depth_m - 0.1) / DEPTH_STEP_M).ceil().max(1.0) as usize;
+        for step in 0..steps {
+            let piece = build(&plan, config.carcass_depth_m - step as f64 * DEPTH_STEP_M, config);
             if free(&piece) {
                 return Some(piece);
             }
-            depth -= DEPTH_STEP_M;
         }
         let mut piece = build(&plan, config.carcass_depth_m, config);
         let blocked = |s: &Solid| placed.iter().any(|(_, other)| overlap::with(other, &s.shape));
@@ -105,9 +104,10 @@ fn plan<'a>(joint: &'a SceneJoint, up: &Vector, config: &config::Fitting) -> Pla
     let (rect, seen) = rectangle(joint, &face);
     let mut articulation = joint.joint;
     if articulation.kind == JointKind::Revolute {
-        // The hinge runs through the leaf: at its front edge, or within its thickness.
+        // The hinge runs along the front edge of the leaf or just before it: about an axis behind it the leaf's edge would
+        // swing into its neighbour.
         let [r, u, h] = face.coordinates(&articulation.origin);
-        articulation.origin = face.point(r, u, h.clamp(-config.board_m, 0.0));
+        articulation.origin = face.point(r, u, h.clamp(0.0, config.board_m));
         for axis in [face.up, face.right] {
             if unsigned_angle(&axis, &articulation.axis) < 12f64.to_radians() {
                 articulation.axis = if axis.dot(&articulation.axis) < 0.0 { -axis } else { axis };
@@ -202,7 +202,8 @@ fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
     let carcass_out = [-depth, -board - gap];
     let slide = plan.articulation.kind == JointKind::Prismatic;
     let mut upper = plan.joint.observed_range;
-    if slide {
+    // A sliding door runs along its face and has no tray behind it.
+    if slide && plan.articulation.axis.dot(&face.normal) > 0.9 {
         let tray = [-(depth - board - 2.0 * gap), -board];
         let inner_r = [r[0] + board + 2.0 * gap, r[1] - board - 2.0 * gap];
         // A tray's walls are lower than its front.

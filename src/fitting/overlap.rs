@@ -56,15 +56,21 @@ pub fn separate(rects: &mut [(Face, Rect)], config: &config::Fitting) {
             let k = usize::from(overlap[1] < overlap[0]);
             let shift = if k == 0 { dr } else { du };
             let mine_is_lower = a.1.bounds[k][0] + a.1.bounds[k][1] < other[k][0] + other[k][1];
-            if mine_is_lower {
-                let cut = 0.5 * (a.1.bounds[k][1] + other[k][0]);
-                rects[i].1.bounds[k][1] = cut;
-                rects[j].1.bounds[k][0] = cut - shift;
+            let (low, high) = (a.1.bounds[k][0].max(other[k][0]), a.1.bounds[k][1].min(other[k][1]));
+            // One inside the other along this direction: the larger gives way up to the smaller's near edge.
+            let inside = |inner: [f64; 2], outer: [f64; 2]| inner[0] >= outer[0] && inner[1] <= outer[1];
+            let (mut mine, mut theirs) = (a.1.bounds[k], other[k]);
+            if inside(theirs, mine) {
+                mine[usize::from(mine_is_lower)] = if mine_is_lower { low } else { high };
+            } else if inside(mine, theirs) {
+                theirs[usize::from(!mine_is_lower)] = if mine_is_lower { high } else { low };
             } else {
-                let cut = 0.5 * (a.1.bounds[k][0] + other[k][1]);
-                rects[i].1.bounds[k][0] = cut;
-                rects[j].1.bounds[k][1] = cut - shift;
+                let cut = 0.5 * (low + high);
+                mine[usize::from(mine_is_lower)] = cut;
+                theirs[usize::from(!mine_is_lower)] = cut;
             }
+            rects[i].1.bounds[k] = mine;
+            rects[j].1.bounds[k] = theirs.map(|x| x - shift);
         }
     }
 }
@@ -92,5 +98,22 @@ mod tests {
         assert!((rects[0].1.bounds[0][1] - 0.28).abs() < 1e-12);
         assert!((rects[1].1.bounds[0][0] + 0.22).abs() < 1e-12);
         assert_eq!(rects[0].1.bounds[1], [-0.2, 0.2]);
+    }
+
+    #[test]
+    fn a_small_part_inside_a_large_one_stays_whole() {
+        let face = Face {
+            center: Point::origin(),
+            right: Vector::x(),
+            up: Vector::z(),
+            normal: -Vector::y(),
+            extent: [[0.0; 2]; 2],
+            support: 1.0,
+        };
+        let mut rects =
+            [(face, Rect { bounds: [[-0.3, 0.3], [-0.4, 0.4]] }), (face, Rect { bounds: [[-0.3, 0.3], [0.04, 0.2]] })];
+        separate(&mut rects, &config::Fitting::default());
+        assert_eq!(rects[1].1.bounds[1], [0.04, 0.2]);
+        assert_eq!(rects[0].1.bounds[1], [-0.4, 0.04]);
     }
 }

@@ -105,7 +105,8 @@ pub fn settled(candidate: &AxisCandidate, paths: &[Vec<Point>], reasoning: &conf
         return candidate.clone();
     }
     let joint = Articulation { origin: origin + e1 * center.x + e2 * center.y, ..candidate.joint };
-    AxisCandidate { joint, shift: center.coords.norm() / std_m, ..candidate.clone() }
+    let shift = candidate.shift.hypot(center.coords.norm() / std_m);
+    AxisCandidate { joint, shift, ..candidate.clone() }
 }
 
 /// What the candidates are made from.
@@ -211,10 +212,23 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
     };
     for direction in directions {
         if let Some(joint) = arc_about(evidence.path, &direction) {
+            let shift = evidence.face.map_or(0.0, |face| implausibility(face, &joint));
             let side = evidence.face.map(|face| side_at(face, &direction, &joint.origin));
-            out.push(AxisCandidate { joint, source: AxisSource::HandArc, side, views: 0, length_m: 0.0, shift: 0.0 });
+            out.push(AxisCandidate { joint, source: AxisSource::HandArc, side, views: 0, length_m: 0.0, shift });
         }
     }
+}
+
+/// How far the centre of an arc lies from where a hinge can be, in standard deviations: off the plane of the face, or
+/// beyond the end of the furniture. A short noisy arc has its centre anywhere along its bisector.
+fn implausibility(face: &Face, joint: &Articulation) -> f64 {
+    const OFF_PLANE_STD_M: f64 = 0.05;
+    const BEYOND_STD_M: f64 = 0.08;
+    let at = face.coordinates(&joint.origin);
+    let across = usize::from(unsigned_angle(&joint.axis, &face.up) > unsigned_angle(&joint.axis, &face.right));
+    let [low, high] = face.extent[across];
+    let beyond = (low - at[across]).max(at[across] - high).max(0.0);
+    (at[2] / OFF_PLANE_STD_M).hypot(beyond / BEYOND_STD_M)
 }
 
 /// The edge at which a hinge through `origin` along the face's `axis` lies.

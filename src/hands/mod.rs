@@ -44,6 +44,28 @@ impl Trajectory {
         [self.samples.first().map_or(0, |s| s.frame), self.samples.last().map_or(0, |s| s.frame)]
     }
 
+    /// Whether it can be worked with: at least one sample, all finite, time not going back. `Err` says what is wrong.
+    ///
+    /// # Errors
+    /// The first fault, in words.
+    pub fn check(&self) -> Result<(), String> {
+        if self.samples.is_empty() {
+            return Err("no samples".to_owned());
+        }
+        let mut last = f64::NEG_INFINITY;
+        for (i, s) in self.samples.iter().enumerate() {
+            let finite = s.smoothed.coords.iter().chain(s.observed.coords.iter()).all(|x| x.is_finite());
+            if !finite || !s.time_secs.is_finite() {
+                return Err(format!("sample {i} is not finite"));
+            }
+            if s.time_secs < last {
+                return Err(format!("sample {i}: time goes back from {last} s to {} s", s.time_secs));
+            }
+            last = s.time_secs;
+        }
+        Ok(())
+    }
+
     /// Smoothed positions.
     #[must_use]
     pub fn positions(&self) -> Vec<Point> {
@@ -123,6 +145,15 @@ pub fn trajectory(
             accepted: smoothed.accepted[i],
         })
         .collect();
+    // A rejected sample at an end is held in place by nothing: the ends are where the grip is read off.
+    let believed = |s: &Sample| s.accepted;
+    let (Some(from), Some(to)) = (samples.iter().position(believed), samples.iter().rposition(believed)) else {
+        return Outcome::Abstained("no hand sample passed the gate".to_owned());
+    };
+    let samples = samples[from..=to].to_vec();
+    if samples.len() < config.min_samples {
+        return Outcome::Abstained(format!("fewer than {} believable hand samples in contact", config.min_samples));
+    }
     let action = reading.action.unwrap_or_else(|| action_by_person(recording, &samples));
     Outcome::Found(Trajectory { side: Some(side), samples, action })
 }

@@ -59,7 +59,7 @@ pub fn infer(trajectory: &BareTrajectory, config: &config::Inference) -> Outcome
         (Some(t), Some(_), _) if t.angle >= MIN_TURN_RAD => {
             (JointKind::Revolute, false, format!("the part itself turned by {:.0} deg", t.angle.to_degrees()))
         }
-        (Some(t), _, _) if extent > 0.1 => {
+        (Some(t), _, _) if extent > 0.1 && t.angle < MIN_TURN_RAD => {
             (JointKind::Prismatic, false, format!("the part itself turned by only {:.0} deg", t.angle.to_degrees()))
         }
         (_, Some((_, fit)), Some(residual)) => {

@@ -49,9 +49,17 @@ pub fn infer(
     reasoning: &config::Reasoning,
     config: &config::Inference,
 ) -> Outcome<ClipJoint> {
-    let kind = if answer.revolute_probability >= 0.5 { JointKind::Revolute } else { JointKind::Prismatic };
+    // Less is the trembling of a hand that holds still.
+    const MIN_EXTENT_M: f64 = 0.03;
+    let positions = trajectory.positions();
+    let extent = positions.iter().map(|p| (p - positions[0]).norm()).fold(0.0, f64::max);
+    if extent < MIN_EXTENT_M {
+        return Outcome::Abstained(format!("the hand in contact moved by only {:.1} cm", 100.0 * extent));
+    }
+    let revolute_probability = answer.revolute_probability(candidates);
+    let kind = if revolute_probability >= 0.5 { JointKind::Revolute } else { JointKind::Prismatic };
     let mut ranked: Vec<(f64, &AxisCandidate)> = answer
-        .log_weights
+        .log_weights()
         .iter()
         .zip(candidates)
         .filter(|(w, c)| c.joint.kind == kind && w.is_finite())
@@ -104,7 +112,7 @@ pub fn infer(
         joint,
         contact_pivot,
         source: best.source,
-        type_probability: answer.revolute_probability.max(1.0 - answer.revolute_probability),
+        type_probability: revolute_probability.max(1.0 - revolute_probability),
         axis_probability: agreeing / total,
         residual_m: residual,
         inliers,
@@ -121,7 +129,7 @@ pub fn torus_tolerance(radius: f64, config: &config::Inference) -> f64 {
     (config.torus_tolerance_ratio * radius).clamp(config.torus_tolerance_min_m, config.torus_tolerance_max_m)
 }
 
-/// Opening that the path goes through: from the closed to the open end without the extreme twentieths, rad or m.
+/// Opening that the path goes through: from the closed to the open end without the extreme 3 % of the samples, rad or m.
 #[must_use]
 pub fn observed_range(joint: &Articulation, grip: &Point, path: &[Point]) -> f64 {
     let openings = openings(joint, grip, path);

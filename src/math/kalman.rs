@@ -39,8 +39,42 @@ pub struct Smoothed {
 type Predicted = (Matrix2<f64>, Matrix3x2<f64>, Matrix2<f64>, bool);
 
 /// Filters forward and smooths backward. `times` (s) must not decrease; both slices have one length.
+///
+/// A start that the following samples contradict (a few samples, then a restart) was wrong: it is rejected and the filter
+/// begins after it.
 #[must_use]
 pub fn smooth(times: &[f64], observations: &[Point], filter: &Filter) -> Smoothed {
+    let n = observations.len().min(times.len());
+    let mut first = 0;
+    loop {
+        let (smoothed, restart) = pass(&times[first..n], &observations[first..n], filter);
+        match restart {
+            Some(lead) if first + lead < n => first += lead,
+            _ => {
+                // Before the first believed sample: its state, backwards in time.
+                let mut out = Smoothed {
+                    positions: Vec::with_capacity(n),
+                    velocities: Vec::with_capacity(n),
+                    variances: Vec::with_capacity(n),
+                    accepted: vec![false; first],
+                };
+                if let (Some(p), Some(v)) = (smoothed.positions.first(), smoothed.variances.first()) {
+                    out.positions.resize(first, *p);
+                    out.velocities.resize(first, Vector::zeros());
+                    out.variances.resize(first, *v);
+                }
+                out.positions.extend(smoothed.positions);
+                out.velocities.extend(smoothed.velocities);
+                out.variances.extend(smoothed.variances);
+                out.accepted.extend(smoothed.accepted);
+                return out;
+            }
+        }
+    }
+}
+
+/// One forward and backward pass; also how many samples a contradicted start has, if there is one.
+fn pass(times: &[f64], observations: &[Point], filter: &Filter) -> (Smoothed, Option<usize>) {
     let n = observations.len().min(times.len());
     let r = filter.observation_std_m.powi(2);
     let prior = Matrix2::new(r, 0.0, 0.0, filter.motion.velocity_variance());
@@ -52,6 +86,7 @@ pub fn smooth(times: &[f64], observations: &[Point], filter: &Filter) -> Smoothe
     let mut predicted: Vec<Predicted> = Vec::with_capacity(n);
     let mut accepted = vec![false; n];
     let mut rejected_in_a_row = 0;
+    let mut contradicted = None;
 
     for t in 0..n {
         let z = &observations[t];
@@ -71,6 +106,11 @@ pub fn smooth(times: &[f64], observations: &[Point], filter: &Filter) -> Smoothe
         let restart =
             filter.restart_after > 0 && rejected_in_a_row >= filter.restart_after && mahalanobis > filter.gate;
         if restart {
+            // As many samples as it takes to restart are needed to be believed against them.
+            let lead = accepted[..t].iter().filter(|a| **a).count();
+            if lead <= filter.restart_after && contradicted.is_none() && predicted[1..].iter().all(|p| !p.3) {
+                contradicted = Some(t - rejected_in_a_row);
+            }
             means.push(start(z));
             covariances.push(prior);
             predicted.push((Matrix2::identity(), start(z), prior, true));
@@ -101,12 +141,13 @@ pub fn smooth(times: &[f64], observations: &[Point], filter: &Filter) -> Smoothe
         means[t] += mean_step * gain.transpose();
         covariances[t] += gain * covariance_step * gain.transpose();
     }
-    Smoothed {
+    let smoothed = Smoothed {
         positions: means.iter().map(|m| Point::from(m.column(0).into_owned())).collect(),
         velocities: means.iter().map(|m| m.column(1).into_owned()).collect(),
         variances: covariances.iter().map(|c| c[(0, 0)]).collect(),
         accepted,
-    }
+    };
+    (smoothed, contradicted)
 }
 
 #[cfg(test)]
@@ -166,8 +207,9 @@ mod tests {
         let mut seen = truth.clone();
         seen[0] += Vector::new(1.0, 0.0, 0.0);
         let out = smooth(&times, &seen, &filter());
-        let late: f64 = out.positions[6..].iter().zip(&truth[6..]).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
-        assert!(late < 0.02, "{late}");
+        let worst = out.positions.iter().zip(&truth).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        assert!(worst < 0.02, "{worst}");
+        assert!(!out.accepted[0] && out.accepted[1..].iter().all(|a| *a), "{:?}", out.accepted);
     }
 
     /// The smoother is the exact posterior mean: it must equal the minimiser of the joint quadratic cost.

@@ -26,27 +26,15 @@ impl Reasoner for Geometric {
     }
 
     fn answer(&self, question: &Question) -> Answer {
-        let priors = log_priors(question);
-        let log_weights: Vec<f64> = question
+        let log_likelihoods = question
             .candidates
             .iter()
             .zip(question.agreement)
-            .zip(priors)
-            .map(|((candidate, agreement), prior)| {
-                self.path_log_likelihood(candidate, question) + depth_log_likelihood(*agreement) + prior
+            .map(|(candidate, agreement)| {
+                self.path_log_likelihood(candidate, question) + depth_log_likelihood(*agreement)
             })
             .collect();
-        let mass = |kind: JointKind| -> f64 {
-            let of_kind: Vec<f64> = question
-                .candidates
-                .iter()
-                .zip(&log_weights)
-                .filter(|(c, _)| c.joint.kind == kind)
-                .map(|(_, w)| *w)
-                .collect();
-            log_sum(&of_kind)
-        };
-        let name = match question.reading.kind {
+        let words_log_odds = match question.reading.kind {
             Some(kind) => {
                 // A generic word is worth half of what a name is worth.
                 let strength = if question.reading.generic { 0.5 } else { 1.0 };
@@ -55,10 +43,7 @@ impl Reasoner for Geometric {
             }
             None => 0.0,
         };
-        let odds = mass(JointKind::Revolute) - mass(JointKind::Prismatic) + name;
-        // Neither type has a candidate: nothing is known.
-        let revolute_probability = if odds.is_nan() { 0.5 } else { 1.0 / (1.0 + (-odds).exp()) };
-        Answer { revolute_probability, log_weights }
+        Answer { log_likelihoods, log_priors: log_priors(question), words_log_odds }
     }
 }
 
@@ -163,12 +148,6 @@ fn shape_log_prior(candidate: &AxisCandidate, part: &PartShape) -> f64 {
     side.ln() + (FLOOR + (1.0 - FLOOR) * grip).ln() + (FLOOR + (1.0 - FLOOR) * shape).ln()
 }
 
-/// `ln sum exp`, minus infinity for nothing.
-fn log_sum(values: &[f64]) -> f64 {
-    let top = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if top == f64::NEG_INFINITY { top } else { top + values.iter().map(|v| (v - top).exp()).sum::<f64>().ln() }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -187,15 +166,11 @@ mod tests {
         }
     }
 
-    fn ask(
-        path: &[Point],
-        kind: Option<JointKind>,
-        candidates: &[AxisCandidate],
-        agreement: &[(f64, usize)],
-    ) -> Answer {
+    fn ask(path: &[Point], kind: Option<JointKind>, candidates: &[AxisCandidate], agreement: &[(f64, usize)]) -> f64 {
         let reading = Reading { moves_joint: Some(true), action: None, furniture: None, kind, generic: false };
         Geometric { reasoning: config::Reasoning::default(), inference: config::Inference::default() }
             .answer(&Question { reading: &reading, path, grip: path[0], candidates, agreement, part: None })
+            .revolute_probability(candidates)
     }
 
     #[test]
@@ -213,15 +188,15 @@ mod tests {
             candidate(JointKind::Prismatic, -Vector::y(), Point::origin(), AxisSource::FaceNormal),
         ];
         let wide = ask(&arc(75.0), Some(JointKind::Prismatic), &candidates, &[(0.0, 0); 2]);
-        assert!(wide.revolute_probability > 0.9, "{wide:?}");
+        assert!(wide > 0.9, "{wide:?}");
         let short = arc(15.0);
         let says_slide = ask(&short, None, &candidates, &[(0.2, 500), (0.9, 500)]);
         let says_hinge = ask(&short, None, &candidates, &[(0.9, 500), (0.2, 500)]);
-        assert!(says_slide.revolute_probability < 0.1 && says_hinge.revolute_probability > 0.8);
+        assert!(says_slide < 0.1 && says_hinge > 0.8);
     }
 
     #[test]
     fn no_candidates_leave_the_type_open() {
-        assert!((ask(&[Point::origin()], None, &[], &[]).revolute_probability - 0.5).abs() < 1e-12);
+        assert!((ask(&[Point::origin()], None, &[], &[]) - 0.5).abs() < 1e-12);
     }
 }

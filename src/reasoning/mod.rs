@@ -7,6 +7,7 @@ pub mod heuristic;
 
 use serde::{Deserialize, Serialize};
 
+use crate::articulation::JointKind;
 use crate::geometry::AxisCandidate;
 use crate::math::Point;
 use crate::recording::narration::Reading;
@@ -38,13 +39,59 @@ pub struct PartShape {
     pub grip: [f64; 2],
 }
 
-/// The motion type with its probability, and each candidate's weight as an explanation.
+/// What speaks for each candidate: the evidence of the clip, apart from what was believed before.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
-    /// Probability that the part turns (1 - it slides).
-    pub revolute_probability: f64,
-    /// For each candidate: log weight, higher is more plausible; minus infinity rules it out.
-    pub log_weights: Vec<f64>,
+    /// For each candidate the log likelihood of what was seen; minus infinity rules it out.
+    pub log_likelihoods: Vec<f64>,
+    /// For each candidate its log prior.
+    pub log_priors: Vec<f64>,
+    /// Log odds of a hinge over a slide from words alone (the furniture's name, a language model).
+    pub words_log_odds: f64,
+}
+
+impl Answer {
+    /// Log weight of each candidate: likelihood times prior.
+    #[must_use]
+    pub fn log_weights(&self) -> Vec<f64> {
+        self.log_likelihoods.iter().zip(&self.log_priors).map(|(l, p)| l + p).collect()
+    }
+
+    /// Probability that the part turns: the mass of all hinges against that of all slides, and the words.
+    #[must_use]
+    pub fn revolute_probability(&self, candidates: &[AxisCandidate]) -> f64 {
+        let weights = self.log_weights();
+        let mass = |kind: JointKind| {
+            let of_kind: Vec<f64> =
+                candidates.iter().zip(&weights).filter(|(c, _)| c.joint.kind == kind).map(|(_, w)| *w).collect();
+            log_sum(&of_kind)
+        };
+        let odds = mass(JointKind::Revolute) - mass(JointKind::Prismatic) + self.words_log_odds;
+        // Neither type has a candidate: nothing is known.
+        if odds.is_nan() { 0.5 } else { 1.0 / (1.0 + (-odds).exp()) }
+    }
+
+    /// Answers about the same candidates from several clips of one part: the clips' evidence adds up, what was believed
+    /// before counts once, and so do the words (one person names the same furniture each time).
+    #[must_use]
+    pub fn together(answers: &[Self]) -> Option<Self> {
+        let first = answers.first()?;
+        let count = answers.len() as f64;
+        let sum = |pick: fn(&Self) -> &Vec<f64>| -> Vec<f64> {
+            (0..pick(first).len()).map(|i| answers.iter().map(|a| pick(a)[i]).sum()).collect()
+        };
+        Some(Self {
+            log_likelihoods: sum(|a| &a.log_likelihoods),
+            log_priors: sum(|a| &a.log_priors).iter().map(|p| p / count).collect(),
+            words_log_odds: answers.iter().map(|a| a.words_log_odds).sum::<f64>() / count,
+        })
+    }
+}
+
+/// `ln sum exp`, minus infinity for nothing.
+fn log_sum(values: &[f64]) -> f64 {
+    let top = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if top == f64::NEG_INFINITY { top } else { top + values.iter().map(|v| (v - top).exp()).sum::<f64>().ln() }
 }
 
 /// Whoever answers.

@@ -128,7 +128,8 @@ pub(super) fn open(dir: &Path) -> Result<Recording> {
 fn check_camera(file: &CamerasFile, faults: &mut Faults) -> Camera {
     let Camera { width, height, fx, fy, cx, cy } =
         Camera { width: file.width, height: file.height, fx: file.fx, fy: file.fy, cx: file.cx, cy: file.cy };
-    if width == 0 || height == 0 || width > 1 << 15 || height > 1 << 15 {
+    // 64 megapixels: twice the largest camera that anyone wears, and an image that fits in memory many times.
+    if width == 0 || height == 0 || width.saturating_mul(height) > 64 << 20 {
         faults.add("size", format!("cameras.json: image size {width} x {height} is not a camera's"));
     }
     if !(fx.is_finite() && fy.is_finite() && fx > 1.0 && fy > 1.0) {
@@ -212,6 +213,13 @@ fn frames(dir: &Path, file: &CamerasFile, faults: &mut Faults) -> Vec<Frame> {
                 mask: optional("masks", index),
             },
         });
+    }
+    let steps: Vec<f64> = out.windows(2).map(|w| w[1].timestamp_secs - w[0].timestamp_secs).collect();
+    if let Some(step) = stats::median(&steps).filter(|s| s.is_finite() && !(1e-3..=10.0).contains(s)) {
+        faults.add(
+            "time unit",
+            format!("cameras.json: frames are {step:.3e} s apart (median), a video's are 0.005 to 1 s; write seconds"),
+        );
     }
     let furthest = out.iter().map(|f| f.center().coords.norm()).fold(0.0, f64::max);
     // Head-worn recordings stay in a home; a home measured in millimetres is a city.
@@ -432,7 +440,16 @@ fn reconstruction(dir: &Path) -> Result<Vec<Point>> {
     } else {
         return Ok(Vec::new());
     };
-    Ok(points.into_iter().filter(|p| p.coords.iter().all(|x| x.is_finite())).collect())
+    let finite: Vec<Point> = points.into_iter().filter(|p| p.coords.iter().all(|x| x.is_finite())).collect();
+    if finite.is_empty() {
+        let file = if ply.is_file() { ply } else { obj };
+        return Err(Error::format(
+            &file,
+            "vertices",
+            "no finite points (of an OBJ only vertices in faces count); use PLY",
+        ));
+    }
+    Ok(finite)
 }
 
 #[derive(Default)]

@@ -133,6 +133,7 @@ pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
             // A joint that could not be built is still an answer.
             let phi = part.map_or(joint.joint, |p| p.joint.articulation);
             let path = trajectory.positions();
+            row.reason = None;
             row.kind = Some(phi.kind);
             row.axis = Some(phi.axis);
             row.origin = Some(phi.origin);

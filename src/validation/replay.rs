@@ -81,14 +81,24 @@ pub fn simulate(
         return Err(Error::Simulation(format!("{}: an empty path", part.id)));
     };
     let Surroundings { obstacles, up, density } = around;
+    // A person opens a part within seconds; ten minutes are another unit.
+    const MAX_SECS: f64 = 600.0;
+    if !(0.0..=MAX_SECS).contains(&end) {
+        return Err(Error::Simulation(format!(
+            "{}: the recorded hand takes {end:.3e} s; time stamps must be seconds and must not go back",
+            part.id
+        )));
+    }
     let origin = joint.origin;
     let dt = config.step_secs;
     let mut world = PhysicsWorld::new();
     world.gravity = (up * -9.81).cast::<f32>().into();
     world.integration_parameters.dt = dt as f32;
     let base = world.insert_body(RigidBodyBuilder::fixed());
+    // A body of their own: the joint switches contacts off between the two bodies that it connects.
+    let fixed = world.insert_body(RigidBodyBuilder::fixed());
     for shape in obstacles {
-        world.insert_collider(collider(shape, &origin, 0.0), Some(base));
+        world.insert_collider(collider(shape, &origin, 0.0), Some(fixed));
     }
     let body = world.insert_body(RigidBodyBuilder::dynamic().can_sleep(false));
     for solid in &part.solids {

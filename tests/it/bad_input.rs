@@ -100,6 +100,13 @@ fn impossible_poses_are_named_with_their_frame() {
     check("time that goes back", &["frame 6: timestamp"], |r| {
         edit(&r.join("cameras.json"), |v| v["frames"][6]["timestamp"] = json!(-1.0));
     });
+    check("milliseconds", &["cameras.json", "write seconds"], |r| {
+        edit(&r.join("cameras.json"), |v| {
+            for frame in v["frames"].as_array_mut().unwrap() {
+                frame["timestamp"] = json!(frame["timestamp"].as_f64().unwrap() * 1e3);
+            }
+        });
+    });
     check("no focal length", &["focal lengths in pixels"], |r| edit(&r.join("cameras.json"), |v| v["fx"] = json!(0.0)));
     check("no frames", &["cameras.json", "no frames"], |r| edit(&r.join("cameras.json"), |v| v["frames"] = json!([])));
     check("not JSON", &["cameras.json", "line 1"], |r| std::fs::write(r.join("cameras.json"), "{").unwrap());
@@ -197,6 +204,53 @@ fn a_folder_that_is_not_ours_is_never_replaced() {
     assert_eq!(out.status.code(), Some(2));
     assert!(stderr(&out).contains("was not made by paws"), "{}", stderr(&out));
     assert_eq!(std::fs::read_to_string(dir.path().join("mine/thesis.txt")).unwrap(), "years of work");
+}
+
+#[test]
+fn the_input_is_never_the_output() {
+    let dir = tempfile::tempdir().unwrap();
+    let made = paws(&["synth", "--width", "64", "--parts", "1", "--out", "k"], dir.path());
+    assert!(made.status.success(), "{}", stderr(&made));
+    for out in ["k", "."] {
+        let result = paws(&["twin", "k", "--out", out], dir.path());
+        assert_eq!(result.status.code(), Some(2));
+        assert!(stderr(&result).contains("is or contains the input"), "{}", stderr(&result));
+    }
+    assert!(dir.path().join("k/cameras.json").exists());
+}
+
+#[test]
+fn a_clip_with_the_name_of_a_path_stays_inside_the_output() {
+    let dir = tempfile::tempdir().unwrap();
+    copy(SMALL.path(), &dir.path().join("a/rec"));
+    edit(&dir.path().join("a/rec/clips.json"), |v| v["clips"][0]["clip"] = json!("../../../escaped"));
+    let out = paws(&["twin", "rec", "--out", "out", "--keep"], &dir.path().join("a"));
+    assert_ne!(out.status.code(), Some(2), "{}", stderr(&out));
+    let outside: Vec<_> = std::fs::read_dir(dir.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert_eq!(outside, ["a"]);
+}
+
+#[test]
+fn hands_that_cannot_be_replayed_are_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = paws(&["twin", SMALL.path().to_str().unwrap(), "--out", "t"], dir.path());
+    assert_ne!(out.status.code(), Some(2), "{}", stderr(&out));
+    let path = dir.path().join("t/trajectories.json");
+    let good = std::fs::read_to_string(&path).unwrap();
+    for (word, change) in [
+        ("no samples", (|s: &mut Value| *s = json!([])) as fn(&mut Value)),
+        ("time goes back", |s| s[1]["time_secs"] = json!(-1.0)),
+        ("time stamps must be seconds", |s| {
+            let last = s.as_array().unwrap().len() - 1;
+            s[last]["time_secs"] = json!(1e9);
+        }),
+    ] {
+        std::fs::write(&path, &good).unwrap();
+        edit(&path, |v| change(&mut v[0]["clips"][0][1]["samples"]));
+        let out = paws(&["validate", "t"], dir.path());
+        assert_eq!(out.status.code(), Some(2), "{word}: {}", stderr(&out));
+        assert!(stderr(&out).contains(word), "{word}: {}", stderr(&out));
+    }
 }
 
 #[test]

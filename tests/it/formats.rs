@@ -233,6 +233,10 @@ fn a_twin_that_no_simulator_takes_is_refused() {
         ((|t: &mut Twin| t.furniture[0].part.joint.upper = f64::NAN) as fn(&mut Twin), "upper limit"),
         (|t: &mut Twin| t.furniture[0].part.joint.articulation.axis *= 2.0, "unit vector"),
         (|t: &mut Twin| t.furniture[0].part.solids[0].shape.half.x = 0.0, "sizes must be positive"),
+        (|t: &mut Twin| t.furniture[0].part.solids[0].shape.half.x = 1e300, "within 1000 m"),
+        (|t: &mut Twin| t.furniture[0].part.joint.upper = 1e12, "upper limit"),
+        (|t: &mut Twin| t.density_kg_per_m3 = 0.0, "density"),
+        (|t: &mut Twin| t.furniture[0].name = "world".to_owned(), "used twice"),
         (|t: &mut Twin| t.furniture[0].part.id = "a\"><b".to_owned(), "letters, digits"),
         (|t: &mut Twin| t.furniture[1].name = t.furniture[0].name.clone(), "used twice"),
     ] {

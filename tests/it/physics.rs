@@ -136,3 +136,31 @@ fn a_constant_pull_follows_the_closed_form() {
     let opened = at[1] - start;
     assert!((opened / expected_there - 1.0).abs() < 0.05, "{opened} against {expected_there}");
 }
+
+/// The same pull with a wall in the way ends at the wall.
+#[test]
+fn furniture_in_the_way_stops_the_part() {
+    let furniture = door();
+    let part = &furniture.part;
+    let joint = part.joint.articulation;
+    let hand = hand(&joint, 1.2);
+    let drive = Drive {
+        times_secs: hand.samples.iter().map(|s| s.time_secs).collect(),
+        path: hand.positions(),
+        grip: part.handle,
+    };
+    let wall = OrientedBox {
+        center: Point::new(0.25, -0.35, 0.35),
+        half: Vector::new(0.5, 0.02, 0.5),
+        rotation: Matrix3::identity(),
+    };
+    let config = Config::default().validation;
+    let replay = |obstacles: &[OrientedBox]| {
+        let around = Surroundings { obstacles, up: &Vector::z(), density: 700.0 };
+        simulate(part, &joint, 1.6, around, &drive, &config).unwrap()
+    };
+    assert!(replay(&[]).reached[1] > 1.1);
+    // The free edge meets the wall where 0.5 m sin(q) = 0.33 m.
+    let blocked = replay(&[wall]).reached[1];
+    assert!((0.6..0.8).contains(&blocked), "{blocked}");
+}
