@@ -1,4 +1,5 @@
-//! A kitchen of boxes: a row of base furniture with fronts, a tall fridge, wall cupboards.
+//! A kitchen of boxes: a row of base furniture with fronts, a tall fridge, wall cupboards, a sideboard turned against
+//! the room.
 
 use nalgebra::Matrix3;
 use rand::RngExt;
@@ -53,8 +54,6 @@ pub struct Kitchen {
     pub fixed: Vec<Block>,
     /// What does.
     pub parts: Vec<OpenPart>,
-    /// Along the row, out of the wall, up.
-    pub axes: [Vector; 3],
 }
 
 const BOARD: f64 = 0.018;
@@ -111,6 +110,7 @@ impl Builder {
             Some(Side::Left) => (fx[0] + 0.045, handle_height(fz), true),
             Some(Side::Right) => (fx[1] - 0.045, handle_height(fz), true),
             Some(Side::Bottom) => (0.5 * (fx[0] + fx[1]), fz[1] - 0.05, false),
+            Some(Side::Top) => (0.5 * (fx[0] + fx[1]), fz[0] + 0.05, false),
             None => {
                 (0.5 * (fx[0] + fx[1]), if fz[1] - fz[0] > 0.25 { fz[1] - 0.06 } else { 0.5 * (fz[0] + fz[1]) }, false)
             }
@@ -158,6 +158,9 @@ impl Builder {
             Some(Side::Bottom) => {
                 Articulation { kind: JointKind::Revolute, axis: along(-Vector::x()), origin: at(middle_x, face, fz[0]) }
             }
+            Some(Side::Top) => {
+                Articulation { kind: JointKind::Revolute, axis: along(Vector::x()), origin: at(middle_x, face, fz[1]) }
+            }
             None => Articulation {
                 kind: JointKind::Prismatic,
                 axis: along(Vector::y()),
@@ -166,6 +169,7 @@ impl Builder {
         };
         let upper = match hinge {
             Some(Side::Bottom) => 1.4,
+            Some(Side::Top) => 1.5,
             Some(_) => 1.7,
             None => 0.42,
         };
@@ -189,6 +193,7 @@ impl Builder {
 enum Side {
     Left,
     Right,
+    Top,
     Bottom,
 }
 
@@ -248,12 +253,13 @@ pub fn build(rng: &mut Pcg64Mcg) -> Kitchen {
         x += width;
     }
     let row = x;
-    // Wall cupboards over part of the row.
+    // Wall cupboards over part of the row; some open upwards.
     let mut upper_x = 0.1;
     while upper_x + 0.5 < row - 0.3 {
         let width = [0.4, 0.5][rng.random_range(0..2)];
         let (span, z) = ([upper_x, upper_x + width], [1.38, 2.02]);
-        b.wall_cupboard(span, z, if rng.random_bool(0.5) { Side::Left } else { Side::Right });
+        let side = [Side::Left, Side::Right, Side::Top][rng.random_range(0..3)];
+        b.wall_cupboard(span, z, side);
         upper_x += width;
     }
     // The fridge at the end of the row: a freezer door below, the fridge door above.
@@ -262,13 +268,15 @@ pub fn build(rng: &mut Pcg64Mcg) -> Kitchen {
         b.carcass(span, z, 3);
         b.part("fridge", span, z, Some(if side { Side::Left } else { Side::Right }), [span, [0.0, DEPTH], z]);
     }
+    // A sideboard across the room, turned against it: nothing about it follows the room's directions.
+    b.sideboard(rng);
     // Worktop, plinth, wall, floor, and a few things on the worktop.
     let far = [-1.5, row + 2.1];
     for (bounds, color) in [
         ([[0.0, row], [0.0, DEPTH + 0.03], [high, high + 0.04]], [70, 66, 64]),
         ([[0.0, row + 0.6], [0.0, DEPTH - 0.05], [0.0, low]], [60, 60, 62]),
         ([far, [-0.05, 0.0], [0.0, 2.6]], [206, 204, 196]),
-        ([far, [-0.05, 4.0], [-0.05, 0.0]], [150, 146, 140]),
+        ([far, [-0.05, 5.0], [-0.05, 0.0]], [150, 146, 140]),
     ] {
         let block = b.block(bounds, color, 0);
         b.fixed.push(block);
@@ -280,11 +288,25 @@ pub fn build(rng: &mut Pcg64Mcg) -> Kitchen {
         let block = b.block([[px, px + w], [py, py + w], [high + 0.04, high + 0.04 + h]], color, 0);
         b.fixed.push(block);
     }
-    let axes = [Vector::x(), Vector::y(), Vector::z()].map(|v| world_from_kitchen * v);
-    Kitchen { fixed: b.fixed, parts: b.parts, axes }
+    Kitchen { fixed: b.fixed, parts: b.parts }
 }
 
 impl Builder {
+    /// A low cupboard and a drawer side by side, standing free, turned by 15 to 75 degrees.
+    fn sideboard(&mut self, rng: &mut Pcg64Mcg) {
+        let here = self.world_from_kitchen;
+        let turn = rotation(&Vector::z(), rng.random_range(0.26..1.3));
+        self.world_from_kitchen = here * Pose::from_parts(Vector::new(-1.4, 2.4, 0.0).into(), turn);
+        let (left, right, z) = ([0.0, 0.5], [0.5, 1.0], [0.08, 0.6]);
+        let base = |span: [f64; 2]| [span, [0.0, DEPTH], z];
+        let side = if rng.random_bool(0.5) { Side::Left } else { Side::Right };
+        self.carcass(left, z, 2);
+        self.part("cupboard", left, z, Some(side), base(left));
+        self.carcass(right, z, 1);
+        self.part("drawer", right, z, None, base(right));
+        self.world_from_kitchen = here;
+    }
+
     /// A shallow cupboard on the wall whose front is in the plane of its own carcass.
     fn wall_cupboard(&mut self, x: [f64; 2], z: [f64; 2], side: Side) {
         // Wall furniture is 0.35 m deep; shifting the frame keeps all fronts built by one rule.

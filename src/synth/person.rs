@@ -113,11 +113,11 @@ pub fn play(kitchen: &Kitchen, count: usize, rng: &mut Pcg64Mcg) -> Take {
     for view in 0..18 {
         let part = &kitchen.parts
             [if view < 2 * chosen.len() { chosen[view % chosen.len()] } else { order[view % order.len()] }];
-        let side = kitchen.axes[0] * rng.random_range(-0.7..0.7);
+        let along = Vector::z().cross(&part.out);
+        let side = along * rng.random_range(-0.7..0.7);
         let mut eye = part.handle + part.out * rng.random_range(0.9..1.6) + side;
         eye.z = eye_height + rng.random_range(-0.1..0.1);
-        let target =
-            part.handle + kitchen.axes[0] * rng.random_range(-0.2..0.2) - Vector::z() * rng.random_range(0.0..0.25);
+        let target = part.handle + along * rng.random_range(-0.2..0.2) - Vector::z() * rng.random_range(0.0..0.25);
         take.still(time, look_at(&eye, &target), &openings);
         time += 0.5;
     }
@@ -127,7 +127,17 @@ pub fn play(kitchen: &Kitchen, count: usize, rng: &mut Pcg64Mcg) -> Take {
         // People open a drawer or a dishwasher as far as they need, a door about as far as a right angle.
         let target = (share * part.upper).min(1.5);
         for action in [Action::Open, Action::Close] {
-            take.clip(part, index, action, target, eye_height, &kitchen.axes[0], &mut time, &mut openings, rng);
+            take.clip(
+                part,
+                index,
+                action,
+                target,
+                eye_height,
+                &Vector::z().cross(&part.out),
+                &mut time,
+                &mut openings,
+                rng,
+            );
             let last = take.frames.last().map(|f| f.world_from_camera);
             for _ in 0..2 {
                 time += 0.4;

@@ -8,7 +8,7 @@ use std::process::Command;
 
 use paws_twin::synth::{Options, Tier};
 
-use crate::common::{optional_data, paws, record, stderr};
+use crate::common::{optional_data, paws, record, skipped, stderr};
 
 fn required() -> bool {
     ["CI", "PAWS_REQUIRE_SIMULATORS"].iter().any(|v| std::env::var_os(v).is_some_and(|x| !x.is_empty()))
@@ -41,7 +41,7 @@ fn mujoco_loads_both_files_and_every_joint_rests_opens_and_closes() {
         Ok(python) => python,
         Err(reason) if required() => panic!("the simulator checks cannot run: {reason}"),
         Err(reason) => {
-            eprintln!("skipped: the simulator checks need python3 and PyPI ({reason})");
+            skipped(&format!("the simulator checks need python3 and PyPI ({reason})"));
             return;
         }
     };

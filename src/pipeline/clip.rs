@@ -1,0 +1,188 @@
+//! One clip: hands and localisation, then geometry, reasoning and inference (§3.1 to §3.4).
+
+use std::collections::BTreeMap;
+
+use super::ClipResult;
+use crate::articulation::Outcome;
+use crate::config::Config;
+use crate::error::Result;
+use crate::geometry::moved::{self, Rect};
+use crate::geometry::segments::{LiftedSegment, ViewGeometry};
+use crate::geometry::{Face, LineTrack, ManhattanFrame, candidates, face, tracks};
+use crate::hands::{self, Trajectory};
+use crate::inference;
+use crate::localization::{self, Region, views};
+use crate::math::Point;
+use crate::reasoning::{PartShape, Question, Reasoner};
+use crate::recording::narration::{self, Reading};
+use crate::recording::{Clip, Recording};
+
+/// A clip after hands and localisation.
+pub(super) struct Located {
+    reading: Reading,
+    trajectory: Option<Trajectory>,
+    region: Option<Region>,
+    pub(super) views: Vec<usize>,
+    reason: Option<String>,
+}
+
+pub(super) fn locate(recording: &Recording, clip: &Clip, config: &Config) -> Result<Located> {
+    let reading = narration::read(clip);
+    let mut located = Located { reading, trajectory: None, region: None, views: Vec::new(), reason: None };
+    if located.reading.moves_joint == Some(false) {
+        located.reason = Some(format!("the narration \"{}\" moves no door or drawer", clip.narration));
+        return Ok(located);
+    }
+    let trajectory = match hands::trajectory(recording, clip, &located.reading, &config.hands) {
+        Outcome::Found(t) => t,
+        Outcome::Abstained(reason) => {
+            located.reason = Some(reason);
+            return Ok(located);
+        }
+    };
+    match localization::localize(recording, clip, &trajectory, &config.localization)? {
+        Outcome::Found(region) => {
+            located.views = views::reselect(recording, &region, &config.localization);
+            located.region = Some(region);
+        }
+        Outcome::Abstained(reason) => located.reason = Some(reason),
+    }
+    located.trajectory = Some(trajectory);
+    Ok(located)
+}
+
+/// Everything from the clip's lines to its joint.
+pub(super) fn infer(
+    recording: &Recording,
+    clip: &Clip,
+    located: Located,
+    lifted: &BTreeMap<usize, ViewGeometry>,
+    room: Option<&ManhattanFrame>,
+    reasoner: &dyn Reasoner,
+    config: &Config,
+) -> Result<ClipResult> {
+    let mut result = ClipResult {
+        clip: clip.clone(),
+        trajectory: located.trajectory,
+        region: located.region,
+        views: located.views,
+        lines: Vec::new(),
+        face: None,
+        part: None,
+        candidates: Vec::new(),
+        answer: None,
+        joint: Outcome::Abstained(located.reason.unwrap_or_default()),
+    };
+    let (Some(trajectory), Some(region)) = (&result.trajectory, &result.region) else { return Ok(result) };
+
+    let in_views: Vec<&LiftedSegment> =
+        result.views.iter().filter_map(|v| lifted.get(v)).flat_map(|g| &g.segments).collect();
+    result.lines = tracks::build(&in_views, region, &config.geometry, config.seed);
+    let surface = surface(region, &result.views, lifted, config.localization.reach_m);
+    let around = face::Surroundings {
+        surface: &surface,
+        grips: [region.grip, trajectory.open_grip()],
+        viewpoint: region.viewpoint,
+        manhattan: room,
+        up: upward(recording, room),
+    };
+    result.face = face::fit(&around, &config.geometry, config.seed);
+
+    let path = trajectory.positions();
+    let open = moved::open_views(recording, clip, trajectory)?;
+    let stops = result.face.as_ref().map_or_else(Vec::new, |f| edges_on(f, &result.lines));
+    if let Some(face) = &result.face {
+        result.part = moved::vote(face, &surface, &open, None, &config.fitting).moving_rect(&stops);
+    }
+    result.candidates = candidates::collect(
+        &candidates::Evidence {
+            face: result.face.as_ref(),
+            rect: result.part.as_ref(),
+            tracks: &result.lines,
+            manhattan: room,
+            grip: region.grip,
+            path: &path,
+        },
+        &config.inference,
+    );
+    let paths = [path.clone()];
+    result.candidates = result.candidates.iter().map(|c| candidates::settled(c, &paths, &config.reasoning)).collect();
+    let agreement: Vec<(f64, usize)> = result
+        .candidates
+        .iter()
+        .map(|c| {
+            result
+                .face
+                .as_ref()
+                .map_or((0.0, 0), |f| moved::agreement(f, result.part.as_ref(), &c.joint, &region.grip, &open))
+        })
+        .collect();
+    let answer = reasoner.answer(&Question {
+        reading: &located.reading,
+        path: &path,
+        grip: region.grip,
+        candidates: &result.candidates,
+        agreement: &agreement,
+        part: result.part.as_ref().map(part_shape),
+    });
+    result.joint = inference::infer(
+        trajectory,
+        &result.candidates,
+        &answer,
+        result.face.as_ref(),
+        &config.reasoning,
+        &config.inference,
+    );
+    // With the joint known, the part is also seen where the joint puts it: the rectangle again, from all evidence.
+    if let (Some(face), Outcome::Found(joint)) = (&result.face, &result.joint) {
+        let votes = moved::vote(face, &surface, &open, Some((&joint.joint, &region.grip)), &config.fitting);
+        result.part = votes.moving_rect(&stops).or(result.part);
+    }
+    result.answer = Some(answer);
+    Ok(result)
+}
+
+/// Up, as the room's own upright edges have it where they are near the world's (which may be off by a degree).
+fn upward(recording: &Recording, room: Option<&ManhattanFrame>) -> crate::math::Vector {
+    let up = recording.up();
+    room.map(|r| r.axes[2]).filter(|axis| crate::math::signed_angle(axis, &up) < 5f64.to_radians()).unwrap_or(up)
+}
+
+/// Points of the touched furniture: of the local frames, and of the global views where masks tell what belongs to it.
+fn surface(region: &Region, views: &[usize], lifted: &BTreeMap<usize, ViewGeometry>, reach_m: f64) -> Vec<Point> {
+    let mut points = region.points.clone();
+    let of_class = |class: u8| region.class.is_none_or(|c| c == class);
+    for geometry in views.iter().filter_map(|v| lifted.get(v)) {
+        let here = geometry.points.iter().filter(|(p, c)| of_class(*c) && (p - region.grip).norm() <= reach_m);
+        points.extend(here.map(|(p, _)| *p));
+    }
+    points
+}
+
+/// Lines on a face that run along one of its axes, as [`moved::CellVotes::moving_rect`] takes them.
+fn edges_on(face: &Face, lines: &[LineTrack]) -> Vec<(usize, f64, [f64; 2])> {
+    lines
+        .iter()
+        .filter_map(|line| {
+            let [a, b] = line.segment.ends().map(|p| face.coordinates(&p));
+            let near = a[2].abs() < 0.05 && b[2].abs() < 0.05;
+            let along = line.segment.line.direction;
+            let upright = along.dot(&face.up).abs() > 0.98;
+            let level = along.dot(&face.right).abs() > 0.98;
+            if !near || !(upright || level) {
+                return None;
+            }
+            // An upright line bounds the part to the right or left, a level one above or below.
+            let (axis, other) = if upright { (0, 1) } else { (1, 0) };
+            let span = [a[other].min(b[other]), a[other].max(b[other])];
+            Some((axis, 0.5 * (a[axis] + b[axis]), span))
+        })
+        .collect()
+}
+
+/// The grip is the origin of the face's coordinates.
+pub(super) fn part_shape(rect: &Rect) -> PartShape {
+    let size_m = rect.size();
+    let grip = [0, 1].map(|i| -0.5 * (rect.bounds[i][0] + rect.bounds[i][1]) / size_m[i].max(1e-6));
+    PartShape { size_m, grip }
+}

@@ -1,0 +1,213 @@
+//! The whole paper on one screen: every step in order, every intermediate kept.
+
+mod clip;
+mod scene;
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::articulation::{Articulation, Outcome};
+use crate::config::Config;
+use crate::error::{Error, Result};
+use crate::geometry::moved::Rect;
+use crate::geometry::segments::{LineDetector, ViewGeometry, lift_view};
+use crate::geometry::{AxisCandidate, Face, LineTrack, ManhattanFrame, manhattan};
+use crate::hands::Trajectory;
+use crate::inference::ClipJoint;
+use crate::localization::Region;
+use crate::math::Point;
+use crate::reasoning::{Answer, Reasoner};
+use crate::recording::{Clip, Recording};
+
+/// Everything that was found out about one clip, step by step.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct ClipResult {
+    /// The clip.
+    pub clip: Clip,
+    /// Hands (§3.1).
+    pub trajectory: Option<Trajectory>,
+    /// Localisation (§3.1).
+    pub region: Option<Region>,
+    /// Global views (§3.2).
+    pub views: Vec<usize>,
+    /// 3D lines (§3.2).
+    pub lines: Vec<LineTrack>,
+    /// The touched face.
+    pub face: Option<Face>,
+    /// The part of the face that was seen to move.
+    pub part: Option<Rect>,
+    /// Candidate axes (§3.2).
+    pub candidates: Vec<AxisCandidate>,
+    /// The answers to the two questions (§3.3).
+    pub answer: Option<Answer>,
+    /// The joint (§3.4), or the reason why there is none.
+    pub joint: Outcome<ClipJoint>,
+}
+
+/// One joint of the scene with all that the later steps need to know about it.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct SceneJoint {
+    /// Name, unique in the scene.
+    pub id: String,
+    /// The merged joint; positive opens.
+    pub joint: Articulation,
+    /// Names of the clips that show it.
+    pub clips: Vec<String>,
+    /// The word that people used for the furniture.
+    pub furniture: Option<String>,
+    /// Probability of the type.
+    pub type_probability: f64,
+    /// The grip when closed, world.
+    pub grip: Point,
+    /// The touched face.
+    pub face: Option<Face>,
+    /// The moving part of the face.
+    pub part: Option<Rect>,
+    /// Largest opening that was observed, rad or m.
+    pub observed_range: f64,
+}
+
+/// The scene.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Scene {
+    /// The recording's name.
+    pub recording: String,
+    /// The room's frame (§A.5).
+    pub manhattan: Option<ManhattanFrame>,
+    /// Clips in the recording's order.
+    pub clips: Vec<ClipResult>,
+    /// Joints in the order of their first clip.
+    pub joints: Vec<SceneJoint>,
+}
+
+/// Told how far the work is: (step, done, total).
+pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
+
+/// Runs hands, localisation, geometry, reasoning, inference and aggregation.
+///
+/// # Errors
+/// Only what makes the whole recording unusable, and images that cannot be decoded. A clip without an answer is an
+/// answer: its reason stands in [`ClipResult::joint`].
+pub fn infer(
+    recording: &Recording,
+    config: &Config,
+    detector: &dyn LineDetector,
+    reasoner: &dyn Reasoner,
+    progress: Progress,
+) -> Result<Scene> {
+    check_depth(recording)?;
+    // Hands and localisation, clip by clip.
+    let total = recording.clips.len();
+    let counter = std::sync::atomic::AtomicUsize::new(0);
+    let tick = |step: &str, total: usize| {
+        let done = counter.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
+        progress(step, done, total);
+    };
+    let located: Vec<clip::Located> = recording
+        .clips
+        .par_iter()
+        .map(|clip| {
+            let located = clip::locate(recording, clip, config);
+            tick("localising", total);
+            located
+        })
+        .collect::<Result<_>>()?;
+
+    // Every global view is decoded once, however many clips look through it.
+    let mut wanted: Vec<usize> = located.iter().flat_map(|l| l.views.iter().copied()).collect();
+    wanted.sort_unstable();
+    wanted.dedup();
+    counter.store(0, std::sync::atomic::Ordering::Relaxed);
+    let lifted: BTreeMap<usize, ViewGeometry> = wanted
+        .par_iter()
+        .map(|&view| {
+            let geometry = lift_view(recording, view, detector, &config.geometry, config.seed)?;
+            tick("finding lines", wanted.len());
+            Ok((view, geometry))
+        })
+        .collect::<Result<_>>()?;
+    let room = manhattan::estimate(recording, &with_normals_first(recording, &wanted), &config.geometry)?;
+
+    counter.store(0, std::sync::atomic::Ordering::Relaxed);
+    let clips: Vec<ClipResult> = recording
+        .clips
+        .par_iter()
+        .zip(located)
+        .map(|(clip, located)| {
+            let result = clip::infer(recording, clip, located, &lifted, room.as_ref(), reasoner, config);
+            tick("inferring", total);
+            result
+        })
+        .collect::<Result<_>>()?;
+    let joints = scene::merge(recording, &clips, reasoner, config)?;
+    Ok(Scene { recording: recording.name.clone(), manhattan: room, clips, joints })
+}
+
+/// Zero depth everywhere, or depth in another unit than the hands, is an export gone wrong, not a scene; a few frames tell.
+fn check_depth(recording: &Recording) -> Result<()> {
+    let with_depth: Vec<usize> =
+        (0..recording.frames.len()).filter(|&f| recording.frames[f].files.depth.is_some()).collect();
+    if with_depth.is_empty() {
+        if recording.reconstruction.is_empty() {
+            return Err(Error::Recording {
+                path: recording.dir.clone(),
+                faults: vec![
+                    "no depth: there is neither depth/000000.png ... nor reconstruction.ply or .obj; run a metric depth \
+                     estimator (MoGe-2) or add a static reconstruction"
+                        .to_owned(),
+                ],
+            });
+        }
+        return Ok(());
+    }
+    // Hands tell what depth should be where they are: a ratio far from 1 is a unit, not an error of estimation.
+    let mut ratios = Vec::new();
+    let mut any = false;
+    let with_hand: Vec<&crate::recording::HandSample> =
+        recording.hands.iter().filter(|h| recording.frames[h.frame].files.depth.is_some()).collect();
+    for i in 0..with_hand.len().min(8) {
+        let hand = with_hand[i * with_hand.len() / with_hand.len().min(8)];
+        let Some(depth) = recording.depth(hand.frame)? else { continue };
+        any |= depth.data.iter().any(|z| *z > 0.0);
+        let local = recording.frames[hand.frame].world_from_camera.inverse() * hand.grasp();
+        let seen = recording.camera.project(&local).and_then(|(u, v)| depth.nearest(u, v));
+        ratios.extend(seen.filter(|z| *z > 0.0).map(|z| f64::from(z) / local.z));
+    }
+    if let Some(ratio) = crate::math::stats::median(&ratios).filter(|r| !(0.2..8.0).contains(r)) {
+        return Err(Error::Recording {
+            path: recording.dir.clone(),
+            faults: vec![format!(
+                "depth: where hands are, depth is {ratio:.3} times their distance: hands and depth disagree on the unit; depth \
+                 must be 16-bit millimetres, hands metres"
+            )],
+        });
+    }
+    if any {
+        return Ok(());
+    }
+    for i in 0..with_depth.len().min(8) {
+        let frame = with_depth[i * with_depth.len() / with_depth.len().min(8)];
+        if recording.depth(frame)?.is_some_and(|d| d.data.iter().any(|z| *z > 0.0)) {
+            return Ok(());
+        }
+    }
+    Err(Error::Recording {
+        path: recording.dir.clone(),
+        faults: vec![
+            "depth: every value is 0 = no value; depth must be 16-bit PNG in millimetres (were metres written as integers?)"
+                .to_owned(),
+        ],
+    })
+}
+
+/// Views for the room's frame: those with a normals file first, at most thirty.
+fn with_normals_first(recording: &Recording, views: &[usize]) -> Vec<usize> {
+    // The frame of a room is known to a fraction of a degree from far fewer.
+    const ENOUGH: usize = 30;
+    let (with, without): (Vec<usize>, Vec<usize>) =
+        views.iter().partition(|&&v| recording.frames[v].files.normals.is_some());
+    let all: Vec<usize> = if with.len() >= 5 { with } else { with.into_iter().chain(without).collect() };
+    (0..all.len().min(ENOUGH)).map(|i| all[i * all.len() / all.len().min(ENOUGH)]).collect()
+}

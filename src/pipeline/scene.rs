@@ -1,0 +1,181 @@
+//! Clips of one part to one joint of the scene (§C.2).
+
+use rayon::prelude::*;
+
+use super::clip::part_shape;
+use super::{ClipResult, SceneJoint};
+use crate::articulation::{Articulation, JointKind};
+use crate::config::Config;
+use crate::error::Result;
+use crate::geometry::{AxisCandidate, candidates, moved};
+use crate::hands::Trajectory;
+use crate::inference::{self, aggregate};
+use crate::math::Point;
+use crate::reasoning::{Answer, Question, Reasoner};
+use crate::recording::Recording;
+use crate::recording::narration;
+
+/// Clips to scene-level joints (§C.2).
+pub(super) fn merge(
+    recording: &Recording,
+    clips: &[ClipResult],
+    reasoner: &dyn Reasoner,
+    config: &Config,
+) -> Result<Vec<SceneJoint>> {
+    // Clips with a hand take part even where they have no answer of their own: what they show counts.
+    let mut seen: Vec<(usize, &ClipResult, &Trajectory)> =
+        clips.iter().enumerate().filter_map(|(i, c)| c.trajectory.as_ref().map(|t| (i, c, t))).collect();
+    // Clips may be listed in any order; people open before they close.
+    seen.sort_by_key(|(i, c, _)| (c.clip.start_frame, *i));
+    let held: Vec<aggregate::Held> = seen
+        .iter()
+        .map(|(_, clip, trajectory)| aggregate::Held {
+            action: trajectory.action,
+            closed: trajectory.closed_grip(),
+            open: trajectory.open_grip(),
+            normal: clip.face.map(|f| f.normal),
+            kind: narration::read(&clip.clip).kind.filter(|_| !narration::read(&clip.clip).generic),
+            part: clip.face.zip(clip.part),
+            joint: clip.joint.found().filter(|j| j.type_probability > 0.9).map(|j| j.joint),
+        })
+        .collect();
+    let groups: Vec<Vec<usize>> = aggregate::group(&held, &config.inference)
+        .into_iter()
+        .map(|g| g.into_iter().map(|i| seen[i].0).collect::<Vec<usize>>())
+        .filter(|g| g.iter().any(|&c| clips[c].joint.found().is_some()))
+        .collect();
+    let merged: Vec<Option<SceneJoint>> =
+        groups.par_iter().map(|g| merge_group(recording, clips, g, reasoner, config)).collect::<Result<_>>()?;
+    let mut joints: Vec<SceneJoint> = merged.into_iter().flatten().collect();
+    for (i, joint) in joints.iter_mut().enumerate() {
+        joint.id = format!("joint_{i}");
+    }
+    Ok(joints)
+}
+
+/// The candidates of all clips of a part as far as they fit the face of the clip that saw it best.
+fn pooled(
+    clips: &[ClipResult],
+    group: &[usize],
+    best: usize,
+    grip: &Point,
+    config: &crate::config::Inference,
+) -> Vec<AxisCandidate> {
+    let mut all = clips[best].candidates.clone();
+    let Some(face) = &clips[best].face else { return all };
+    let snap = config.snap_deg.to_radians();
+    for &c in group.iter().filter(|&&c| c != best) {
+        for candidate in &clips[c].candidates {
+            // The other clips' slides are this face's or the room's, which are there already.
+            if candidate.joint.kind == JointKind::Prismatic {
+                continue;
+            }
+            let axis = candidate.joint.axis;
+            let Some(along) = [face.up, face.right].into_iter().find(|a| crate::math::unsigned_angle(a, &axis) <= snap)
+            else {
+                continue;
+            };
+            let side = candidates::side_at(face, &along, &candidate.joint.origin);
+            let joint = candidates::outward(Articulation { axis: along, ..candidate.joint }, face, grip);
+            all.push(AxisCandidate { joint, side: Some(side), ..candidate.clone() });
+        }
+    }
+    all
+}
+
+/// All candidates of all clips of one part, judged on every clip: the best explains all of them.
+fn merge_group(
+    recording: &Recording,
+    clips: &[ClipResult],
+    group: &[usize],
+    reasoner: &dyn Reasoner,
+    config: &Config,
+) -> Result<Option<SceneJoint>> {
+    // The clip that saw the closed part best gives the face, the grip and the part's outline.
+    let trust = |c: usize| -> f64 {
+        let clip = &clips[c];
+        let (Some(face), Some(region)) = (&clip.face, &clip.region) else { return 0.0 };
+        let standoff = face.coordinates(&region.grip)[2];
+        let held = (-0.5 * ((standoff - config.geometry.grip_standoff_m) / 0.05).powi(2)).exp();
+        held * (0.2 + face.support) * if clip.part.is_some() { 2.0 } else { 1.0 }
+    };
+    let Some(&best) = group
+        .iter()
+        .filter(|&&c| clips[c].joint.found().is_some())
+        .max_by(|&&a, &&b| trust(a).total_cmp(&trust(b)).then(b.cmp(&a)))
+    else {
+        return Ok(None);
+    };
+    let Some(best_joint) = clips[best].joint.found() else { return Ok(None) };
+    let grip = best_joint.grip;
+    let face = clips[best].face;
+    let (mut joint, mut type_probability) = (best_joint.joint, best_joint.type_probability);
+    if group.len() > 1 {
+        let paths: Vec<Vec<Point>> =
+            group.iter().filter_map(|&c| clips[c].trajectory.as_ref()).map(Trajectory::positions).collect();
+        let pooled: Vec<AxisCandidate> = pooled(clips, group, best, &grip, &config.inference)
+            .iter()
+            .map(|c| candidates::settled(c, &paths, &config.reasoning))
+            .collect();
+        let mut answers = Vec::new();
+        for &c in group {
+            let Some(trajectory) = &clips[c].trajectory else { continue };
+            let open = moved::open_views(recording, &clips[c].clip, trajectory)?;
+            let path = trajectory.positions();
+            let agreement: Vec<(f64, usize)> = pooled
+                .iter()
+                .map(|k| {
+                    face.as_ref()
+                        .map_or((0.0, 0), |f| moved::agreement(f, clips[best].part.as_ref(), &k.joint, &grip, &open))
+                })
+                .collect();
+            answers.push(reasoner.answer(&Question {
+                reading: &narration::read(&clips[c].clip),
+                path: &path,
+                grip,
+                candidates: &pooled,
+                agreement: &agreement,
+                part: clips[best].part.as_ref().map(part_shape),
+            }));
+        }
+        let Some(answer) = Answer::together(&answers) else { return Ok(None) };
+        let weights = answer.log_weights();
+        let revolute_probability = answer.revolute_probability(&pooled);
+        let revolute = revolute_probability >= 0.5;
+        let of_kind = |k: &AxisCandidate| (k.joint.kind == JointKind::Revolute) == revolute;
+        let top = (0..pooled.len())
+            .filter(|&i| of_kind(&pooled[i]) && weights[i].is_finite())
+            .max_by(|&a, &b| weights[a].total_cmp(&weights[b]).then(b.cmp(&a)));
+        if let Some(top) = top {
+            let all: Vec<(Articulation, f64)> =
+                pooled.iter().zip(&weights).map(|(k, w)| (k.joint, (w - weights[top]).exp())).collect();
+            joint = aggregate::consensus(&pooled[top].joint, &all);
+            type_probability = revolute_probability.max(1.0 - revolute_probability);
+        }
+    }
+    let trajectories = || group.iter().filter_map(|&c| clips[c].trajectory.as_ref());
+    let sense: f64 = trajectories().map(|t| joint.opening_at(&t.closed_grip(), &t.open_grip())).sum();
+    let leaves_face = face.is_some_and(|f| {
+        let out = match joint.kind {
+            JointKind::Revolute => joint.axis.cross(&(grip - joint.origin)).normalize(),
+            JointKind::Prismatic => joint.axis,
+        };
+        out.dot(&f.normal).abs() > 0.3
+    });
+    if sense < 0.0 && !leaves_face {
+        joint = joint.reversed();
+    }
+    let observed_range =
+        trajectories().map(|t| inference::observed_range(&joint, &t.closed_grip(), &t.positions())).fold(0.0, f64::max);
+    Ok(Some(SceneJoint {
+        id: String::new(),
+        joint,
+        clips: group.iter().map(|&c| clips[c].clip.clip.clone()).collect(),
+        furniture: group.iter().find_map(|&c| narration::read(&clips[c].clip).furniture),
+        type_probability,
+        grip,
+        face,
+        part: clips[best].part,
+        observed_range,
+    }))
+}
