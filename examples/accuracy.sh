@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Accuracy on synthetic kitchens with a known answer: 12 kitchens, 6 parts each, opened and closed.
-#   examples/accuracy.sh [clean|realistic] [first seed] [kitchens]
+#   examples/accuracy.sh [clean|realistic|hard] [first seed] [kitchens]
 # About a minute on two cores.
 set -euo pipefail
 cd "$(dirname "$0")/.."

@@ -1,5 +1,7 @@
 //! Clips of one part to one joint of the scene (§C.2).
 
+use std::cmp::Ordering;
+
 use rayon::prelude::*;
 
 use super::clip::part_shape;
@@ -7,7 +9,8 @@ use super::{ClipResult, SceneJoint};
 use crate::articulation::{Articulation, JointKind};
 use crate::config::Config;
 use crate::error::Result;
-use crate::geometry::{AxisCandidate, candidates, moved};
+use crate::geometry::moved::Rect;
+use crate::geometry::{AxisCandidate, Face, candidates, moved};
 use crate::hands::Trajectory;
 use crate::inference::{self, aggregate};
 use crate::math::Point;
@@ -122,11 +125,31 @@ fn merge_group(
             let Some(trajectory) = &clips[c].trajectory else { continue };
             let open = moved::open_views(recording, &clips[c].clip, trajectory)?;
             let path = trajectory.positions();
+            // Depth and hands are biased clip by clip: the face and the grip of the clip itself fit its views best, those
+            // of the best clip stand in where it did not see its closed end. Every candidate gets the same choice.
+            let own = clips[c].face.filter(|own| {
+                face.is_some_and(|f| {
+                    crate::math::signed_angle(&own.normal, &f.normal) < config.inference.merge_angle_deg.to_radians()
+                })
+            });
+            let own_grip = trajectory.closed_grip();
+            let contexts: Vec<(Face, Option<Rect>, Point)> = [
+                face.map(|f| (f, clips[best].part, grip)),
+                face.map(|f| (f, clips[best].part, own_grip)),
+                own.map(|f| (f, clips[c].part, own_grip)),
+            ]
+            .into_iter()
+            .flatten()
+            .collect();
             let agreement: Vec<(f64, usize)> = pooled
                 .iter()
                 .map(|k| {
-                    face.as_ref()
-                        .map_or((0.0, 0), |f| moved::agreement(f, clips[best].part.as_ref(), &k.joint, &grip, &open))
+                    contexts
+                        .iter()
+                        .map(|(f, rect, grip)| moved::agreement(f, rect.as_ref(), &k.joint, grip, &open))
+                        // A share of few points is noise.
+                        .max_by(|a, b| (a.1 >= 100, a.0).partial_cmp(&(b.1 >= 100, b.0)).unwrap_or(Ordering::Equal))
+                        .unwrap_or((0.0, 0))
                 })
                 .collect();
             answers.push(reasoner.answer(&Question {

@@ -25,6 +25,8 @@ pub enum Tier {
     Clean,
     /// Errors of estimated hands, poses, depth and contact as they are on real recordings
     Realistic,
+    /// Twice as large ones, short motions, shifted narrations of which a third say only "open it"
+    Hard,
 }
 
 /// What to record.
@@ -71,7 +73,7 @@ impl Recorded {
                 kitchen.parts.len()
             )));
         }
-        let take = person::play(&kitchen, options.parts, &mut rng);
+        let take = person::play(&kitchen, options.parts, options.tier == Tier::Hard, &mut rng);
         let seen = noise::observe(&take, options.tier, &mut rng);
         let (width, height) = (options.width, options.width * 3 / 4);
         let focal = 0.6 * width as f64;

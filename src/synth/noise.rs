@@ -79,6 +79,19 @@ fn sizes(tier: Tier) -> Sizes {
             depth_scale: 0.02,
             depth_frame: 0.01,
         },
+        Tier::Hard => Sizes {
+            pose_m: 0.006,
+            pose_rad: 0.006,
+            hand_white_m: 0.006,
+            hand_lateral_m: 0.015,
+            hand_ray_m: 0.03,
+            ray_bias: 0.03,
+            outliers: 0.1,
+            dropout: 0.28,
+            flips: 0.1,
+            depth_scale: 0.05,
+            depth_frame: 0.02,
+        },
     }
 }
 
@@ -103,7 +116,7 @@ pub fn observe(take: &Take, tier: Tier, rng: &mut Pcg64Mcg) -> Seen {
         poses: Vec::new(),
         hands: Vec::new(),
         depth_scale: Vec::new(),
-        pixel_seed: (tier == Tier::Realistic).then(|| rng.random()),
+        pixel_seed: (tier != Tier::Clean).then(|| rng.random()),
     };
     let mut last = f64::NEG_INFINITY;
     for (frame, truth) in take.frames.iter().enumerate() {

@@ -74,9 +74,10 @@ fn smooth_step(s: f64) -> f64 {
     s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s)
 }
 
-/// Plays a take: a look around, then each chosen part opened and closed, with a distractor in between.
+/// Plays a take: a look around, then each chosen part opened and closed, with a distractor in between. A `hard` take has
+/// short motions and vague, shifted narrations.
 #[must_use]
-pub fn play(kitchen: &Kitchen, count: usize, rng: &mut Pcg64Mcg) -> Take {
+pub fn play(kitchen: &Kitchen, count: usize, hard: bool, rng: &mut Pcg64Mcg) -> Take {
     let mut take = Take::default();
     let mut openings = vec![0.0; kitchen.parts.len()];
     let mut time = 0.0;
@@ -123,7 +124,7 @@ pub fn play(kitchen: &Kitchen, count: usize, rng: &mut Pcg64Mcg) -> Take {
     }
     for (n, &index) in chosen.iter().enumerate() {
         let part = &kitchen.parts[index];
-        let share = rng.random_range(0.6..0.95);
+        let share = if hard { rng.random_range(0.3..0.75) } else { rng.random_range(0.6..0.95) };
         // People open a drawer or a dishwasher as far as they need, a door about as far as a right angle.
         let target = (share * part.upper).min(1.5);
         for action in [Action::Open, Action::Close] {
@@ -138,6 +139,9 @@ pub fn play(kitchen: &Kitchen, count: usize, rng: &mut Pcg64Mcg) -> Take {
                 &mut openings,
                 rng,
             );
+            if hard {
+                take.blur_last_clip(rng);
+            }
             let last = take.frames.last().map(|f| f.world_from_camera);
             for _ in 0..2 {
                 time += 0.4;
@@ -173,6 +177,19 @@ impl Take {
             contact: false,
             is_still: true,
         });
+    }
+
+    /// Shifts the last narration by up to two thirds of a second, and makes every third of them vague.
+    fn blur_last_clip(&mut self, rng: &mut Pcg64Mcg) {
+        let Some(clip) = self.clips.last_mut() else { return };
+        let [first, last] = clip.true_span;
+        let mut moved = |at: usize| (at as i64 + rng.random_range(-8..=8)).clamp(first as i64, last as i64) as usize;
+        let (start, end) = (moved(clip.span[0]), moved(clip.span[1]));
+        clip.span = [start.min(end), start.max(end).max(start.min(end) + 1).min(last)];
+        if rng.random_bool(1.0 / 3.0) {
+            clip.narration = format!("{} it", clip.verb);
+            clip.noun = "it".to_owned();
+        }
     }
 
     #[allow(clippy::too_many_arguments, reason = "one call, all of it state of the take")]
