@@ -8,6 +8,7 @@ use crate::articulation::{Articulation, JointKind};
 use crate::config;
 use crate::geometry::Face;
 use crate::geometry::moved::Rect;
+use crate::inference::observed_range;
 use crate::math::{Vector, any_orthogonal, unit, unsigned_angle};
 use crate::pipeline::{Scene, SceneJoint};
 use crate::twin::{Furniture, Joint, LeftOut, OrientedBox, Part, Role, Solid, Twin};
@@ -22,6 +23,8 @@ const HANDLE_BAR_HALF_M: f64 = 0.06;
 #[derive(Debug, Clone)]
 struct Plan<'a> {
     joint: &'a SceneJoint,
+    /// Largest opening that a clip went through under the joint as built.
+    observed: f64,
     articulation: Articulation,
     face: Face,
     rect: Rect,
@@ -31,7 +34,7 @@ struct Plan<'a> {
 /// Builds the twin of a scene.
 #[must_use]
 pub fn fit(scene: &Scene, up: &Vector, config: &config::Fitting) -> Twin {
-    let mut plans: Vec<Plan> = scene.joints.iter().map(|j| plan(j, up, config)).collect();
+    let mut plans: Vec<Plan> = scene.joints.iter().map(|j| plan(scene, j, up, config)).collect();
     let mut rects: Vec<(Face, Rect)> = plans.iter().map(|p| (p.face, p.rect)).collect();
     overlap::separate(&mut rects, config);
     for (plan, (_, rect)) in plans.iter_mut().zip(rects) {
@@ -99,7 +102,7 @@ fn shrunk(plan: &Plan, share: f64) -> Rect {
 }
 
 /// Face, rectangle and the joint moved onto them.
-fn plan<'a>(joint: &'a SceneJoint, up: &Vector, config: &config::Fitting) -> Plan<'a> {
+fn plan<'a>(scene: &Scene, joint: &'a SceneJoint, up: &Vector, config: &config::Fitting) -> Plan<'a> {
     let face = joint.face.unwrap_or_else(|| assumed_face(joint, up));
     let (rect, seen) = rectangle(joint, &face);
     let mut articulation = joint.joint;
@@ -114,7 +117,15 @@ fn plan<'a>(joint: &'a SceneJoint, up: &Vector, config: &config::Fitting) -> Pla
             }
         }
     }
-    Plan { joint, articulation, face, rect, seen }
+    let observed = scene
+        .clips
+        .iter()
+        .filter(|c| joint.clips.contains(&c.clip.clip))
+        .filter_map(|c| c.trajectory.as_ref())
+        .map(|t| observed_range(&articulation, &t.closed_grip(), &t.positions()))
+        .fold(None, |most: Option<f64>, range| Some(most.map_or(range, |m| m.max(range))))
+        .unwrap_or(joint.observed_range);
+    Plan { joint, observed, articulation, face, rect, seen }
 }
 
 /// Without a face in the images the motion of the grip tells which way the front looks.
@@ -201,7 +212,7 @@ fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
 
     let carcass_out = [-depth, -board - gap];
     let slide = plan.articulation.kind == JointKind::Prismatic;
-    let mut upper = plan.joint.observed_range;
+    let mut upper = plan.observed;
     // A sliding door runs along its face and has no tray behind it.
     if slide && plan.articulation.axis.dot(&face.normal) > 0.9 {
         let tray = [-(depth - board - 2.0 * gap), -board];
@@ -255,7 +266,7 @@ fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
             joint: Joint {
                 articulation,
                 upper: upper.clamp(least, std::f64::consts::PI),
-                observed: plan.joint.observed_range,
+                observed: plan.observed,
                 damping,
                 friction,
             },
