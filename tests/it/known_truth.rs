@@ -1,5 +1,6 @@
 //! The whole pipeline on kitchens whose answer is known: without noise, then with the errors of real estimators.
 
+use paws_twin::articulation::JointKind;
 use paws_twin::evaluation::{Report, Rule, Truth, evaluate};
 use paws_twin::report::files::predictions;
 use paws_twin::synth::{Options, Tier};
@@ -26,8 +27,17 @@ fn without_noise_every_joint_is_right_to_a_degree_and_a_few_centimetres() {
     for clip in &report.per_clip {
         let m = clip.measured.as_ref().unwrap();
         assert!(m.type_right && m.signed_axis_rad < 1f64.to_radians(), "{clip:?}");
-        assert!(m.truth_to_line_m.unwrap() < 0.04, "{clip:?}");
+        // A slide's line may run anywhere along its front: origins of slides are exempt in every rule.
+        assert!(m.kind == JointKind::Prismatic || m.truth_to_line_m.unwrap() < 0.04, "{clip:?}");
     }
+}
+
+#[test]
+fn twice_the_noise_short_motions_and_vague_words_lose_few() {
+    let report = report(104, Tier::Hard, 6);
+    assert_eq!(report.false_positives, 0);
+    let [m, ma, _] = shares(&report, Rule::UsdnetMaoSt);
+    assert!(m >= 0.8 && ma >= 0.75, "{m} {ma}");
 }
 
 #[test]
