@@ -78,16 +78,17 @@ fn same_place(a: &Held, b: &Held, config: &config::Inference) -> bool {
     faces_agree && (a.closed - b.closed).norm() <= limit && outlines_agree(a, b) && joints_agree(a, b)
 }
 
-/// Handles of neighbours can be a hand's width apart; the parts behind them do not overlap.
+/// Handles of neighbours can be a hand's width apart; the parts behind them do not overlap. An outline that was seen badly
+/// is too large rather than elsewhere, so the overlap is measured against the smaller one.
 fn outlines_agree(a: &Held, b: &Held) -> bool {
-    const LEAST_IOU: f64 = 0.3;
+    const LEAST_SHARE: f64 = 0.5;
     let (Some((face, mine)), Some((other_face, theirs))) = (&a.part, &b.part) else { return true };
     let [right, up, _] = face.coordinates(&other_face.center);
     let theirs = [theirs.bounds[0].map(|x| x + right), theirs.bounds[1].map(|x| x + up)];
     let overlap: f64 =
         (0..2).map(|k| (mine.bounds[k][1].min(theirs[k][1]) - mine.bounds[k][0].max(theirs[k][0])).max(0.0)).product();
     let area = |b: &[[f64; 2]; 2]| (b[0][1] - b[0][0]) * (b[1][1] - b[1][0]);
-    overlap >= LEAST_IOU * (area(&mine.bounds) + area(&theirs) - overlap)
+    overlap >= LEAST_SHARE * area(&mine.bounds).min(area(&theirs))
 }
 
 /// Two doors side by side are hinged at their outer edges: both hinges are sure and far apart.
