@@ -142,33 +142,6 @@ pub fn agreement(face: &Face, rect: Option<&Rect>, joint: &Articulation, grip: &
     (there as f64 / count.max(1) as f64, count)
 }
 
-/// Moves each side to the nearest line along it. Cells at the rim of a part are half its and half its neighbour's, so the
-/// outline ends a few centimetres short: a line may be that far outside, and a cell inside.
-fn snapped(rect: Rect, stops: &[(usize, f64, [f64; 2])]) -> Rect {
-    const OUTSIDE_M: f64 = 0.06;
-    const INSIDE_M: f64 = 0.02;
-    let mut bounds = rect.bounds;
-    for axis in [0, 1] {
-        let across = rect.bounds[1 - axis];
-        for (side, sign) in [(0, -1.0), (1, 1.0)] {
-            let edge = rect.bounds[axis][side];
-            let nearest = stops
-                .iter()
-                .filter(|(a, _, span)| {
-                    let covers = span[1].min(across[1]) - span[0].max(across[0]);
-                    *a == axis && covers > 0.4 * (across[1] - across[0])
-                })
-                .map(|(_, offset, _)| (offset - edge) * sign)
-                .filter(|out| (-INSIDE_M..=OUTSIDE_M).contains(out))
-                .min_by(|a, b| a.abs().total_cmp(&b.abs()));
-            if let Some(out) = nearest {
-                bounds[axis][side] = edge + sign * out;
-            }
-        }
-    }
-    Rect { bounds }
-}
-
 /// Depth noise that a surface at distance `z` may show: half a voxel and 2 % of the distance (metric depth estimates).
 fn tolerance(z: f64) -> f64 {
     0.025 + 0.02 * z
@@ -254,7 +227,7 @@ impl CellVotes {
     #[must_use]
     pub fn moving_rect(&self, stops: &[(usize, f64, [f64; 2])]) -> Option<Rect> {
         let seen = self.seen_rect()?;
-        Some(snapped(self.grown(seen, stops), stops))
+        Some(self.grown(seen, stops))
     }
 
     /// Extends a rectangle side by side over cells that no open view saw.
