@@ -16,15 +16,6 @@ pub enum JointKind {
 }
 
 impl JointKind {
-    /// The other type.
-    #[must_use]
-    pub fn other(self) -> Self {
-        match self {
-            Self::Revolute => Self::Prismatic,
-            Self::Prismatic => Self::Revolute,
-        }
-    }
-
     /// The word for people: "hinge" or "slide".
     #[must_use]
     pub fn word(self) -> &'static str {

@@ -9,7 +9,7 @@ use crate::config;
 use crate::geometry::Face;
 use crate::geometry::moved::Rect;
 use crate::inference::observed_range;
-use crate::math::{Vector, any_orthogonal, unit, unsigned_angle};
+use crate::math::{Vector, any_orthogonal, unit};
 use crate::pipeline::{Scene, SceneJoint};
 use crate::twin::{Furniture, Joint, LeftOut, OrientedBox, Part, Role, Solid, Twin};
 
@@ -111,11 +111,6 @@ fn plan<'a>(scene: &Scene, joint: &'a SceneJoint, up: &Vector, config: &config::
         // swing into its neighbour.
         let [r, u, h] = face.coordinates(&articulation.origin);
         articulation.origin = face.point(r, u, h.clamp(0.0, config.board_m));
-        for axis in [face.up, face.right] {
-            if unsigned_angle(&axis, &articulation.axis) < 12f64.to_radians() {
-                articulation.axis = if axis.dot(&articulation.axis) < 0.0 { -axis } else { axis };
-            }
-        }
     }
     let observed = scene
         .clips

@@ -140,15 +140,23 @@ pub fn collect(evidence: &Evidence, config: &config::Inference) -> Vec<AxisCandi
     out
 }
 
+/// Below this share of the motion along the face's normal (17 degrees) the sign of that share is noise: the joint moves
+/// within its face.
+pub const IN_FACE: f64 = 0.3;
+
+/// Share of the grip's first motion that leaves the face, -1..1; not a number for a hinge through the grip.
+#[must_use]
+pub fn outwardness(joint: &Articulation, face: &Face, grip: &Point) -> f64 {
+    match joint.kind {
+        JointKind::Revolute => joint.axis.cross(&(grip - joint.origin)).normalize().dot(&face.normal),
+        JointKind::Prismatic => joint.axis.dot(&face.normal),
+    }
+}
+
 /// Gives the axis the sense that moves the grip out of the face; a slide within the face keeps its sense.
 #[must_use]
 pub fn outward(joint: Articulation, face: &Face, grip: &Point) -> Articulation {
-    let out = match joint.kind {
-        JointKind::Revolute => joint.axis.cross(&(grip - joint.origin)).normalize().dot(&face.normal),
-        JointKind::Prismatic => joint.axis.dot(&face.normal),
-    };
-    // Within 17 degrees of the face the sign of the normal component is noise.
-    if out < -0.3 { joint.reversed() } else { joint }
+    if outwardness(&joint, face, grip) < -IN_FACE { joint.reversed() } else { joint }
 }
 
 fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCandidate>) {

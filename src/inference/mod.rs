@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::articulation::{Action, Articulation, JointKind, Outcome};
 use crate::config;
+use crate::geometry::candidates::{IN_FACE, outwardness};
 use crate::geometry::{AxisCandidate, AxisSource, Face};
 use crate::hands::Trajectory;
 use crate::math::{Point, Vector, path, stats};
@@ -76,7 +77,7 @@ pub fn infer(
         });
     };
     let path = trajectory.positions();
-    let joint = refined_sense(best.joint, trajectory, face);
+    let joint = opening_sense(best.joint, face, &trajectory.closed_grip(), std::iter::once(trajectory));
     let (residual, inliers, radius_m) = match kind {
         JointKind::Revolute => {
             let Some(fit) = path::about_line(&path, &joint.line(), |r| torus_tolerance(r, config)) else {
@@ -144,19 +145,18 @@ pub fn openings(joint: &Articulation, grip: &Point, path: &[Point]) -> Vec<f64> 
     if joint.kind == JointKind::Revolute { stats::unwrap_angles(&raw) } else { raw }
 }
 
-/// Positive opens. The face tells for joints that leave it; within the face, and without one, the motion does.
-fn refined_sense(joint: Articulation, trajectory: &Trajectory, face: Option<&Face>) -> Articulation {
-    let leaves_face = face.is_some_and(|f| {
-        let out = match joint.kind {
-            JointKind::Revolute => joint.axis.cross(&(trajectory.closed_grip() - joint.origin)).normalize(),
-            JointKind::Prismatic => joint.axis,
-        };
-        out.dot(&f.normal).abs() > 0.3
-    });
-    if leaves_face {
+/// Positive opens. The face tells for joints that leave it; within the face, and without one, the motions do.
+#[must_use]
+pub fn opening_sense<'a>(
+    joint: Articulation,
+    face: Option<&Face>,
+    grip: &Point,
+    trajectories: impl Iterator<Item = &'a Trajectory>,
+) -> Articulation {
+    if face.is_some_and(|f| outwardness(&joint, f, grip).abs() > IN_FACE) {
         return joint;
     }
-    let opened = joint.opening_at(&trajectory.closed_grip(), &trajectory.open_grip());
+    let opened: f64 = trajectories.map(|t| joint.opening_at(&t.closed_grip(), &t.open_grip())).sum();
     if opened < 0.0 { joint.reversed() } else { joint }
 }
 

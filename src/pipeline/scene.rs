@@ -177,17 +177,7 @@ fn merge_group(
         }
     }
     let trajectories = || group.iter().filter_map(|&c| clips[c].trajectory.as_ref());
-    let sense: f64 = trajectories().map(|t| joint.opening_at(&t.closed_grip(), &t.open_grip())).sum();
-    let leaves_face = face.is_some_and(|f| {
-        let out = match joint.kind {
-            JointKind::Revolute => joint.axis.cross(&(grip - joint.origin)).normalize(),
-            JointKind::Prismatic => joint.axis,
-        };
-        out.dot(&f.normal).abs() > 0.3
-    });
-    if sense < 0.0 && !leaves_face {
-        joint = joint.reversed();
-    }
+    joint = inference::opening_sense(joint, face.as_ref(), &grip, trajectories());
     let observed_range =
         trajectories().map(|t| inference::observed_range(&joint, &t.closed_grip(), &t.positions())).fold(0.0, f64::max);
     Ok(Some(SceneJoint {

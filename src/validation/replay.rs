@@ -43,7 +43,7 @@ pub struct Replay {
     pub max_m: f64,
     /// Largest force of the hand, newton.
     pub peak_force_n: f64,
-    /// Opening at the start and the range gone through, rad or m.
+    /// Opening at the start, rad or m.
     pub start: f64,
     /// Least and largest opening reached.
     pub reached: [f64; 2],
