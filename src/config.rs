@@ -21,6 +21,16 @@ pub struct Row {
     pub meaning: String,
 }
 
+/// How 3D lines are made from the segments of several views.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LineMethod {
+    /// The paper's: a line fitted to the unprojected points of all views.
+    Unprojected,
+    /// Ours: the line that the views' planes have in common.
+    Triangulated,
+}
+
 /// Declares one block of the config with its defaults, units and sources in one place.
 macro_rules! block {
     ($(#[doc = $block_doc:literal])* $block:ident, $name:literal, {
@@ -90,16 +100,19 @@ block! {
         min_visible_share: f64 = 0.3, "share", "ours";
         /// Only what lies within this distance of the hand can be the touched furniture.
         reach_m: f64 = 1.5, "m", "ours";
-        /// Every n-th pixel of the local frames is used.
-        pixel_step: usize = 2, "px", "ours";
+        /// Frames of the whole room, outside the interactions, that help to find the scale of depth.
+        survey_frames: usize = 60, "frames", "ours";
     }
 }
 
 block! {
     /// Lines and directions (§3.2, §A.4, §A.5, algorithm 1).
     Geometry, "geometry", {
-        /// Surface points kept of each global view.
-        points_per_view: usize = 20000, "-", "ours";
+        /// Correct each frame's depth by a factor, found from surfaces that several frames see.
+        depth_scale: bool = true, "-", "ours";
+        /// How 3D lines are made: "unprojected" (the paper: fitted to unprojected points) or "triangulated" (from the views'
+        /// planes, depth only says what belongs together).
+        lines: LineMethod = LineMethod::Triangulated, "-", "ours";
         /// Shorter 2D segments are dropped.
         min_segment_px: f64 = 25.0, "px", "ours";
         /// Depth samples along a 2D segment.
@@ -325,7 +338,7 @@ fn sensible(row: &Row) -> [f64; 2] {
         (_, "s") => [1e-3, 100.0],
         (_, "deg") => [1e-2, 180.0],
         (_, "px" | "frames" | "views" | "samples" | "lines") => [1.0, 1e4],
-        ("geometry.points_per_view" | "geometry.normals_per_frame", _) => [100.0, 1e6],
+        ("geometry.normals_per_frame", _) => [100.0, 1e6],
         (_, "-") => [1e-3, 1e4],
         _ => [1e-6, 1e6],
     }

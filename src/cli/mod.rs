@@ -8,6 +8,7 @@ mod evaluate;
 mod export;
 mod infer;
 mod keep;
+mod measure;
 mod output;
 mod progress;
 mod synth;
@@ -57,6 +58,8 @@ enum Command {
     Validate(validate::ValidateArgs),
     /// Compare predictions with the truth
     Evaluate(evaluate::EvaluateArgs),
+    /// Measure the steps before the joint inference on recordings with a truth
+    Measure(measure::MeasureArgs),
     /// Write a recording of a synthetic kitchen with a known answer
     Synth(synth::SynthArgs),
     /// Print every parameter with its value, unit and source
@@ -88,6 +91,7 @@ pub fn run() -> ExitCode {
         Command::Export(args) => export::run(&args),
         Command::Validate(args) => validate::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
+        Command::Measure(args) => measure::run(&args),
         Command::Synth(args) => synth::run(&args),
         Command::Config(args) => config::run(&args),
     };

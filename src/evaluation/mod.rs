@@ -1,6 +1,7 @@
 //! Predictions against truth under named rules, because "MAO" alone is not one number.
 
 pub mod rules;
+pub mod stages;
 pub mod summary;
 pub mod truth;
 

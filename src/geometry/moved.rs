@@ -83,19 +83,20 @@ impl View {
     }
 }
 
-/// Views of the open state: while the hand holds the part far from closed, and just after or before it does.
-pub fn open_views(recording: &Recording, clip: &Clip, trajectory: &Trajectory) -> Result<Vec<View>> {
+/// Frames of the open state, with the grip where the hand holds the part in them: while the hand holds it far from closed,
+/// and just after or before it does.
+#[must_use]
+pub fn open_frames(recording: &Recording, clip: &Clip, trajectory: &Trajectory) -> Vec<(usize, Point)> {
     const HELD: usize = 6;
     const FREE: usize = 3;
     let closed = trajectory.closed_grip();
     let travel = |p: &Point| (p - closed).norm();
     let furthest = trajectory.samples.iter().map(|s| travel(&s.smoothed)).fold(0.0, f64::max);
     let far: Vec<_> = trajectory.samples.iter().filter(|s| travel(&s.smoothed) > 0.5 * furthest).collect();
-    let mut views = Vec::new();
-    for i in 0..far.len().min(HELD) {
-        let sample = far[i * far.len() / far.len().min(HELD)];
-        views.extend(View::load(recording, sample.frame, Some(sample.smoothed))?);
-    }
+    let mut frames: Vec<(usize, Point)> = (0..far.len().min(HELD))
+        .map(|i| far[i * far.len() / far.len().min(HELD)])
+        .map(|sample| (sample.frame, sample.smoothed))
+        .collect();
     // Once let go the part stays where it was left, until the next clip moves something.
     let [first, last] = trajectory.contact_frames();
     let in_other_clip = |f: usize| {
@@ -108,8 +109,16 @@ pub fn open_views(recording: &Recording, clip: &Clip, trajectory: &Trajectory) -
         Action::Open => (last + 1..recording.frames.len()).take_while(|f| !in_other_clip(*f)).take(4 * FREE).collect(),
         Action::Close => (0..first).rev().take_while(|f| !in_other_clip(*f)).take(4 * FREE).collect(),
     };
-    for i in 0..free.len().min(FREE) {
-        views.extend(View::load(recording, free[i * free.len() / free.len().min(FREE)], Some(trajectory.open_grip()))?);
+    let grip = trajectory.open_grip();
+    frames.extend((0..free.len().min(FREE)).map(|i| (free[i * free.len() / free.len().min(FREE)], grip)));
+    frames
+}
+
+/// The frames of [`open_frames`] that have depth, decoded.
+pub fn open_views(recording: &Recording, clip: &Clip, trajectory: &Trajectory) -> Result<Vec<View>> {
+    let mut views = Vec::new();
+    for (frame, grip) in open_frames(recording, clip, trajectory) {
+        views.extend(View::load(recording, frame, Some(grip))?);
     }
     Ok(views)
 }

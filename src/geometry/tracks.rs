@@ -1,12 +1,20 @@
 //! Segments of several views that are one line in the world (§3.2: "2D line correspondences", left open by the paper).
+//!
+//! The paper's method fits a line to the unprojected points of all views ([`unprojected`]). Ours ([`triangulated`]) finds it
+//! from the planes that each view's segment spans with its camera: depth, which is off by centimetres, only says which
+//! segments belong together.
 
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+use nalgebra::{Matrix2, Matrix3, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 
 use super::segments::{LiftedSegment, fit_segment};
 use crate::config;
 use crate::localization::{Region, voxels};
-use crate::math::line::Segment;
-use crate::math::{Point, unsigned_angle};
+use crate::math::line::{Line, Segment};
+use crate::math::{Point, Vector, any_orthogonal, reject, unit, unsigned_angle};
+use crate::recording::Recording;
 
 /// A 3D line seen in several views: a candidate hinge.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -15,12 +23,30 @@ pub struct LineTrack {
     pub segment: Segment,
     /// Frames that see it, ascending.
     pub views: Vec<usize>,
-    /// Root mean square distance of its samples, metres.
+    /// Root mean square distance of what supports it, metres.
     pub rms_m: f64,
+    /// Covariance of its middle, across the line (rank 2), world, m^2.
+    pub position_covariance: Matrix3<f64>,
+    /// Covariance of its unit direction (rank 2), world.
+    pub direction_covariance: Matrix3<f64>,
 }
 
-/// Whether a segment lies at the region: two of its quarter points within a voxel of a confident one.
-fn at_region(segment: &Segment, inside: &std::collections::HashSet<[i32; 3]>, voxel_m: f64) -> bool {
+impl LineTrack {
+    /// Largest standard deviation of its middle across the line, metres.
+    #[must_use]
+    pub fn position_std_m(&self) -> f64 {
+        self.position_covariance.trace().max(0.0).sqrt()
+    }
+}
+
+/// Lines that lie at the region: two of their quarter points within a voxel of a confident one. Best supported first.
+#[must_use]
+pub fn at_region(tracks: &[LineTrack], region: &Region) -> Vec<LineTrack> {
+    let inside: HashSet<[i32; 3]> = region.voxels.iter().copied().collect();
+    tracks.iter().filter(|t| touches(&t.segment, &inside, region.voxel_m)).cloned().collect()
+}
+
+fn touches(segment: &Segment, inside: &HashSet<[i32; 3]>, voxel_m: f64) -> bool {
     let hits = [0.0, 0.25, 0.5, 0.75, 1.0]
         .iter()
         .filter(|t| {
@@ -32,30 +58,22 @@ fn at_region(segment: &Segment, inside: &std::collections::HashSet<[i32; 3]>, vo
     hits >= 2
 }
 
-/// Groups lifted segments at the region into tracks and fits each with LO-RANSAC, best supported first.
+/// The paper's lines: lifted segments of a clip's views at its region, grouped and fitted with LO-RANSAC.
 #[must_use]
-pub fn build(lifted: &[&LiftedSegment], region: &Region, config: &config::Geometry, seed: u64) -> Vec<LineTrack> {
-    let inside: std::collections::HashSet<[i32; 3]> = region.voxels.iter().copied().collect();
-    let mut near: Vec<&LiftedSegment> =
-        lifted.iter().copied().filter(|s| at_region(&s.segment, &inside, region.voxel_m)).collect();
-    // Long segments found the tracks: their direction is known best.
-    near.sort_by(|a, b| b.segment.length().total_cmp(&a.segment.length()).then(a.view.cmp(&b.view)));
-
-    let mut groups: Vec<(Segment, Vec<&LiftedSegment>)> = Vec::new();
-    for candidate in near {
-        let home = groups.iter_mut().find(|(seed, _)| same_line(seed, &candidate.segment, config));
-        match home {
-            Some((_, members)) => members.push(candidate),
-            None => groups.push((candidate.segment, vec![candidate])),
-        }
-    }
-    let mut tracks: Vec<LineTrack> = groups
+pub fn unprojected(
+    lifted: &[&LiftedSegment],
+    region: &Region,
+    config: &config::Geometry,
+    seed: u64,
+) -> Vec<LineTrack> {
+    let inside: HashSet<[i32; 3]> = region.voxels.iter().copied().collect();
+    let near: Vec<&LiftedSegment> =
+        lifted.iter().copied().filter(|s| touches(&s.segment, &inside, region.voxel_m)).collect();
+    let mut tracks: Vec<LineTrack> = groups(&near, config)
         .into_iter()
         .enumerate()
-        .filter_map(|(i, (_, members))| {
-            let mut views: Vec<usize> = members.iter().map(|m| m.view).collect();
-            views.sort_unstable();
-            views.dedup();
+        .filter_map(|(i, members)| {
+            let views = views_of(&members);
             if views.len() < config.min_track_views {
                 return None;
             }
@@ -66,15 +84,115 @@ pub fn build(lifted: &[&LiftedSegment], region: &Region, config: &config::Geomet
                 .map(|p| segment.line.distance(p).powi(2))
                 .filter(|d| *d <= config.line_tolerance_m.powi(2))
                 .collect();
-            let rms_m = (near.iter().sum::<f64>() / near.len().max(1) as f64).sqrt();
-            Some(LineTrack { segment, views, rms_m })
+            let variance = near.iter().sum::<f64>() / near.len().max(1) as f64;
+            // The points of a view share their errors: as many independent ones as there are views.
+            let across = Matrix3::identity() - segment.line.direction * segment.line.direction.transpose();
+            let position_covariance = across * (0.5 * variance / views.len() as f64);
+            let lever = (segment.length() / 12f64.sqrt()).max(0.02);
+            let direction_covariance = position_covariance / (lever * lever);
+            Some(LineTrack { segment, views, rms_m: variance.sqrt(), position_covariance, direction_covariance })
         })
         .collect();
-    tracks.sort_by(|a, b| {
-        let support = |t: &LineTrack| t.views.len() as f64 * t.segment.length();
-        support(b).total_cmp(&support(a))
-    });
+    best_first(&mut tracks);
     tracks
+}
+
+/// Lines of the whole scene from the segments of all views.
+#[must_use]
+pub fn triangulated(recording: &Recording, lifted: &[&LiftedSegment], config: &config::Geometry) -> Vec<LineTrack> {
+    let mut tracks: Vec<LineTrack> = Vec::new();
+    let mut left: Vec<&LiftedSegment> = lifted.to_vec();
+    // Depth groups coarsely: of two edges a few centimetres apart the better seen one wins a group, and what it leaves
+    // makes a group of its own in the next round.
+    for _ in 0..3 {
+        let fresh: Vec<LineTrack> =
+            groups(&left, config).iter().filter_map(|members| triangulate(recording, members, config)).collect();
+        if fresh.is_empty() {
+            break;
+        }
+        tracks.extend(fresh);
+        tracks = merged(tracks);
+        let (assigned, rest) = assign(recording, &left, &tracks);
+        let settled: Vec<LineTrack> =
+            assigned.iter().filter_map(|members| triangulate(recording, members, config)).collect();
+        // A track that lost its members to a neighbour keeps what earlier rounds gave it.
+        tracks = merged(tracks.into_iter().chain(settled).collect());
+        left = rest;
+    }
+    best_first(&mut tracks);
+    tracks
+}
+
+fn best_first(tracks: &mut [LineTrack]) {
+    let support = |t: &LineTrack| t.views.len() as f64 * t.segment.length();
+    tracks.sort_by(|a, b| support(b).total_cmp(&support(a)).then(a.views.cmp(&b.views)));
+}
+
+fn views_of(members: &[&LiftedSegment]) -> Vec<usize> {
+    let mut views: Vec<usize> = members.iter().map(|m| m.view).collect();
+    views.sort_unstable();
+    views.dedup();
+    views
+}
+
+/// A grid of the places that segments run through.
+struct Places {
+    cells: HashMap<[i32; 3], Vec<u32>>,
+}
+
+impl Places {
+    /// About the reach of a comparison: a segment is looked for in its own cell and the ones around it.
+    const CELL_M: f64 = 0.2;
+
+    fn add(&mut self, id: usize, segment: &Segment) {
+        let steps = (segment.length() / (0.5 * Self::CELL_M)).ceil().max(1.0) as usize;
+        let mut last = None;
+        for i in 0..=steps {
+            let at = segment.span[0] + segment.length() * i as f64 / steps as f64;
+            let cell = voxels::index(&(segment.line.point + segment.line.direction * at), Self::CELL_M);
+            if last != Some(cell) {
+                self.cells.entry(cell).or_default().push(id as u32);
+                last = Some(cell);
+            }
+        }
+    }
+
+    /// Ids of segments that run near a point, ascending.
+    fn near(&self, p: &Point, out: &mut Vec<u32>) {
+        out.clear();
+        let [x, y, z] = voxels::index(p, Self::CELL_M);
+        for dx in -1..=1 {
+            for dy in -1..=1 {
+                for dz in -1..=1 {
+                    out.extend(self.cells.get(&[x + dx, y + dy, z + dz]).into_iter().flatten());
+                }
+            }
+        }
+        out.sort_unstable();
+        out.dedup();
+    }
+}
+
+/// Greedy groups of segments that can be one line, by angle, distance and overlap in space.
+fn groups<'a>(lifted: &[&'a LiftedSegment], config: &config::Geometry) -> Vec<Vec<&'a LiftedSegment>> {
+    let mut order: Vec<&LiftedSegment> = lifted.to_vec();
+    // Long segments found the groups: their direction is known best.
+    order.sort_by(|a, b| b.segment.length().total_cmp(&a.segment.length()).then(a.view.cmp(&b.view)));
+    let mut places = Places { cells: HashMap::new() };
+    let mut groups: Vec<Vec<&LiftedSegment>> = Vec::new();
+    let mut near = Vec::new();
+    for candidate in order {
+        places.near(&candidate.segment.middle(), &mut near);
+        let home = near.iter().find(|&&g| same_line(&groups[g as usize][0].segment, &candidate.segment, config));
+        match home {
+            Some(&g) => groups[g as usize].push(candidate),
+            None => {
+                places.add(groups.len(), &candidate.segment);
+                groups.push(vec![candidate]);
+            }
+        }
+    }
+    groups
 }
 
 /// Whether two lifted segments can be one line: near in angle and distance, and overlapping or nearly so.
@@ -92,4 +210,343 @@ fn same_line(a: &Segment, b: &Segment, config: &config::Geometry) -> bool {
     let low = coordinates[0].min(coordinates[1]);
     let high = coordinates[0].max(coordinates[1]);
     low <= a.span[1] + GAP_M && high >= a.span[0] - GAP_M
+}
+
+/// Standard deviation of a detected line in the image, pixels, ends included.
+const DETECTION_STD_PX: f64 = 1.0;
+/// Standard deviation of a camera's place, metres: what poses of head-worn cameras are good to.
+const POSE_STD_M: f64 = 0.004;
+/// Standard deviation of depth along the ray, as a share of the distance, once its scale is corrected.
+const DEPTH_STD: f64 = 0.03;
+
+/// The line that the viewing planes of a group have in common; depth says little more than where along them it lies.
+fn triangulate(recording: &Recording, members: &[&LiftedSegment], config: &config::Geometry) -> Option<LineTrack> {
+    if views_of(members).len() < config.min_track_views {
+        return None;
+    }
+    let focal = recording.camera.fx;
+    let first = members.iter().max_by(|a, b| a.segment.length().total_cmp(&b.segment.length()))?;
+    let mut direction = first.segment.line.direction;
+    let mut point = {
+        let sum = members.iter().fold(Vector::zeros(), |s, m| s + m.segment.middle().coords);
+        Point::from(sum / members.len() as f64)
+    };
+    /// One view's say.
+    struct View {
+        plane: Vector,
+        eye: Point,
+        middle: Point,
+        along: Vector,
+        /// Standard deviations: of the plane at the line, of the line's direction out of the plane, of depth, of the
+        /// direction as depth has it.
+        std: [f64; 4],
+        weight: f64,
+    }
+    let mut views: Vec<View> = members
+        .iter()
+        .map(|m| {
+            let middle = m.segment.middle();
+            let range = (middle - m.eye).norm();
+            let across = (range * DETECTION_STD_PX / focal).hypot(POSE_STD_M);
+            let length = m.segment.length().max(0.03);
+            let depth = DEPTH_STD * range;
+            View {
+                plane: m.plane,
+                eye: m.eye,
+                middle,
+                along: m.segment.line.direction,
+                // Both ends are off independently: the direction by sqrt(12)/2 of it over the length.
+                std: [across, 1.7 * across / length, depth, 1.7 * depth / length],
+                weight: 1.0,
+            }
+        })
+        .collect();
+    let mut position_information = Matrix3::zeros();
+    let mut direction_information = Matrix3::zeros();
+    for _ in 0..8 {
+        position_information = Matrix3::zeros();
+        direction_information = Matrix3::zeros();
+        let mut pull = Vector::zeros();
+        for v in &views {
+            let [across, turn, depth, depth_turn] = v.std;
+            let plane = v.plane * v.plane.transpose();
+            let by_plane = plane * (v.weight / (across * across));
+            // Depth places the line along the ray; along the line itself it says nothing.
+            let ray = unit(&reject(&(v.middle - v.eye), &direction)).unwrap_or_else(|| any_orthogonal(&direction));
+            let by_depth = ray * ray.transpose() * (v.weight / (depth * depth));
+            position_information += by_plane + by_depth;
+            pull += by_plane * v.eye.coords + by_depth * v.middle.coords;
+            // In the viewing plane, depth alone tells the direction.
+            let in_plane = unit(&v.plane.cross(&v.along)).unwrap_or(v.plane);
+            direction_information += plane * (v.weight / (turn * turn))
+                + in_plane * in_plane.transpose() * (v.weight / (depth_turn * depth_turn));
+        }
+        // Along the line the place is free: keep it.
+        let free = direction * direction.transpose() * (1e-6 * position_information.trace());
+        point = Point::from((position_information + free).try_inverse()? * (pull + free * point.coords));
+        let eigen = SymmetricEigen::new(direction_information);
+        let found = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+        direction = if found.dot(&direction) < 0.0 { -found } else { found };
+        for v in &mut views {
+            let r = v.plane.dot(&(point - v.eye)) / v.std[0];
+            let turn = v.plane.dot(&direction) / v.std[1];
+            v.weight = 1.0 / (1.0 + (r / 2.5).powi(2) + (turn / 3.0).powi(2)).powi(2);
+        }
+    }
+    let line = Line { point, direction };
+    let kept: Vec<(&LiftedSegment, &View)> =
+        members.iter().copied().zip(&views).filter(|(_, v)| v.weight > 0.2).collect();
+    let seen = views_of(&kept.iter().map(|(m, _)| *m).collect::<Vec<_>>());
+    if seen.len() < config.min_track_views {
+        return None;
+    }
+    let total: f64 = kept.iter().map(|(_, v)| v.weight).sum();
+    let variance =
+        kept.iter().map(|(_, v)| v.weight * v.plane.dot(&(point - v.eye)).powi(2)).sum::<f64>() / total.max(1e-9);
+    let expected = kept.iter().map(|(_, v)| v.weight * v.std[0].powi(2)).sum::<f64>() / total.max(1e-9);
+    // Where the views disagree by more than assumed, poses are worse than assumed.
+    let inflation = (variance / expected.max(1e-12)).max(1.0);
+    let spans: Vec<[f64; 2]> = kept.iter().filter_map(|(m, _)| span_on(&line, m)).collect();
+    let span = common_span(&spans)?;
+    let segment = Segment { line, span };
+    let moved = Segment { line: Line { point: segment.middle(), direction }, span: [-0.5, 0.5].map(|s| s * segment.length()) };
+    Some(LineTrack {
+        segment: moved,
+        views: seen,
+        rms_m: variance.sqrt(),
+        position_covariance: across_covariance(&position_information, &direction) * inflation,
+        direction_covariance: across_covariance(&direction_information, &direction) * inflation,
+    })
+}
+
+/// Inverse of an information matrix in the plane across a direction.
+fn across_covariance(information: &Matrix3<f64>, direction: &Vector) -> Matrix3<f64> {
+    let e1 = any_orthogonal(direction);
+    let e2 = direction.cross(&e1);
+    let of = |a: &Vector, b: &Vector| a.dot(&(information * b));
+    let flat = Matrix2::new(of(&e1, &e1), of(&e1, &e2), of(&e2, &e1), of(&e2, &e2));
+    let Some(inverse) = flat.try_inverse() else { return Matrix3::identity() };
+    let basis = nalgebra::Matrix3x2::from_columns(&[e1, e2]);
+    basis * inverse * basis.transpose()
+}
+
+/// The stretch of a line that a view's segment covers: where the line passes nearest to the rays of its ends.
+fn span_on(line: &Line, member: &LiftedSegment) -> Option<[f64; 2]> {
+    let at = |end: &Point| -> Option<f64> {
+        let ray = unit(&(end - member.eye))?;
+        let cosine = ray.dot(&line.direction);
+        let rest = 1.0 - cosine * cosine;
+        // Seen end on, a line shows no length.
+        if rest < 0.03 {
+            return None;
+        }
+        let between = line.point - member.eye;
+        Some((ray.dot(&between) * cosine - line.direction.dot(&between)) / rest)
+    };
+    let [a, b] = member.segment.ends();
+    let (a, b) = (at(&a)?, at(&b)?);
+    Some([a.min(b), a.max(b)])
+}
+
+/// The stretch that several views cover: each end is reached by three of them, or by half where there are fewer.
+fn common_span(spans: &[[f64; 2]]) -> Option<[f64; 2]> {
+    let rank = (spans.len() / 2).min(2);
+    let end = |k: usize, sign: f64| -> Option<f64> {
+        let mut values: Vec<f64> = spans.iter().map(|s| sign * s[k]).collect();
+        values.sort_by(f64::total_cmp);
+        values.get(rank).map(|v| sign * v)
+    };
+    let span = [end(0, 1.0)?, end(1, -1.0)?];
+    (span[1] - span[0] > 0.02).then_some(span)
+}
+
+/// Gives each segment to the track that its image shows best: by the track's projection into its view. Returns the members
+/// of each track and the segments that no track explains.
+fn assign<'a>(
+    recording: &Recording,
+    lifted: &[&'a LiftedSegment],
+    tracks: &[LineTrack],
+) -> (Vec<Vec<&'a LiftedSegment>>, Vec<&'a LiftedSegment>) {
+    let mut places = Places { cells: HashMap::new() };
+    for (i, track) in tracks.iter().enumerate() {
+        places.add(i, &track.segment);
+    }
+    let inverses: BTreeMap<usize, crate::math::Pose> =
+        lifted.iter().map(|s| (s.view, recording.frames[s.view].world_from_camera.inverse())).collect();
+    let mut members: Vec<Vec<&LiftedSegment>> = vec![Vec::new(); tracks.len()];
+    let mut rest = Vec::new();
+    let mut near = Vec::new();
+    for &segment in lifted {
+        places.near(&segment.segment.middle(), &mut near);
+        let best = near
+            .iter()
+            .filter_map(|&t| {
+                let cost = misfit(recording, &inverses[&segment.view], segment, &tracks[t as usize])?;
+                Some((cost, t))
+            })
+            .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        match best {
+            Some((_, t)) => members[t as usize].push(segment),
+            None => rest.push(segment),
+        }
+    }
+    (members, rest)
+}
+
+/// How far a segment's image lies from a track's, in tolerances; `None` where it is another line.
+fn misfit(
+    recording: &Recording,
+    camera_from_world: &crate::math::Pose,
+    segment: &LiftedSegment,
+    track: &LineTrack,
+) -> Option<f64> {
+    // Twice what detection and poses are good to, as an angle: a board's two edges are further apart.
+    const ANGLE_RAD: f64 = 0.07;
+    let direction = &track.segment.line.direction;
+    if unsigned_angle(direction, &segment.segment.line.direction) > 0.35 {
+        return None;
+    }
+    let middle = segment.segment.middle();
+    let range = (middle - segment.eye).norm();
+    let tolerance = 2.0 * (range * DETECTION_STD_PX / recording.camera.fx).hypot(POSE_STD_M);
+    let across = segment.plane.dot(&(track.segment.line.point - segment.eye)).abs();
+    let turn = segment.plane.dot(direction).abs();
+    if turn > ANGLE_RAD + 1.7 * tolerance / segment.segment.length().max(0.03) {
+        return None;
+    }
+    // The track's point nearest to the segment lies in the viewing plane, on the segment's stretch, and about as far away.
+    let [low, high] = span_on(&track.segment.line, segment)?;
+    if low > track.segment.span[1] + 0.05 || high < track.segment.span[0] - 0.05 {
+        return None;
+    }
+    let at = (0.5 * (low + high)).clamp(track.segment.span[0], track.segment.span[1]);
+    let p = track.segment.line.point + direction * at;
+    let off = segment.plane.dot(&(p - segment.eye)).abs().min(across.max(0.0));
+    let local = camera_from_world * p;
+    let depth = (local.z - (camera_from_world * middle).z).abs();
+    if off > tolerance || depth > 0.03 + 2.0 * DEPTH_STD * range {
+        return None;
+    }
+    Some(off / tolerance + turn / ANGLE_RAD + depth / range)
+}
+
+/// Of tracks that are one line the best supported one is kept, with the views of all.
+fn merged(mut tracks: Vec<LineTrack>) -> Vec<LineTrack> {
+    const ANGLE_RAD: f64 = 0.06;
+    const APART_M: f64 = 0.012;
+    best_first(&mut tracks);
+    let mut places = Places { cells: HashMap::new() };
+    let mut kept: Vec<LineTrack> = Vec::new();
+    let mut near = Vec::new();
+    for track in tracks {
+        places.near(&track.segment.middle(), &mut near);
+        let twin = near.iter().find(|&&k| {
+            let other = &kept[k as usize].segment;
+            let at = other.line.coordinate(&track.segment.middle());
+            unsigned_angle(&other.line.direction, &track.segment.line.direction) < ANGLE_RAD
+                && other.line.distance(&track.segment.middle()) < APART_M
+                && (other.span[0] - 0.05..other.span[1] + 0.05).contains(&at)
+        });
+        match twin {
+            Some(&k) => {
+                let home = &mut kept[k as usize];
+                home.views.extend(&track.views);
+                home.views.sort_unstable();
+                home.views.dedup();
+            }
+            None => {
+                places.add(kept.len(), &track.segment);
+                kept.push(track);
+            }
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Pose;
+    use crate::recording::{Camera, DepthFactors, Frame};
+
+    fn camera() -> Camera {
+        Camera { width: 640, height: 480, fx: 400.0, fy: 400.0, cx: 319.5, cy: 239.5 }
+    }
+
+    /// Views from eight places about two metres away, all upright, looking along +y.
+    fn recording() -> Recording {
+        let frames = (0..8)
+            .map(|i| {
+                let eye = Vector::new(-0.7 + 0.2 * f64::from(i), -1.6 - 0.05 * f64::from(i % 3), 0.1 * f64::from(i % 4));
+                let turn = nalgebra::UnitQuaternion::from_axis_angle(&Vector::x_axis(), -std::f64::consts::FRAC_PI_2);
+                let world_from_camera = Pose::from_parts(eye.into(), turn);
+                Frame { timestamp_secs: f64::from(i), world_from_camera, files: Default::default() }
+            })
+            .collect();
+        Recording {
+            name: String::new(),
+            dir: std::path::PathBuf::new(),
+            camera: camera(),
+            frames,
+            clips: Vec::new(),
+            hands: Vec::new(),
+            labels: Default::default(),
+            reconstruction: Vec::new(),
+            depth_factors: DepthFactors::default(),
+        }
+    }
+
+    /// What each view makes of an edge: exact in the image, its depth off by a share of its own.
+    fn lift(recording: &Recording, ends: [Point; 2], depth_error: impl Fn(usize) -> f64) -> Vec<LiftedSegment> {
+        (0..recording.frames.len())
+            .map(|view| {
+                let eye = recording.frames[view].center();
+                let far = ends.map(|p| eye + (p - eye) * (1.0 + depth_error(view)));
+                let inverse = recording.frames[view].world_from_camera.inverse();
+                let [a, b] = ends.map(|p| {
+                    let (u, v) = recording.camera.project(&(inverse * p)).unwrap();
+                    [u, v]
+                });
+                LiftedSegment {
+                    view,
+                    image: super::super::segments::Segment2 { a, b },
+                    segment: Segment::between(&far[0], &far[1]).unwrap(),
+                    eye,
+                    plane: (ends[0] - eye).cross(&(ends[1] - eye)).normalize(),
+                    samples: Vec::new(),
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn depth_errors_of_two_per_cent_do_not_move_a_triangulated_line() {
+        let recording = recording();
+        let ends = [Point::new(0.1, 0.0, -0.3), Point::new(0.1, 0.02, 0.4)];
+        let lifted = lift(&recording, ends, |v| if v % 2 == 0 { 0.02 } else { -0.015 });
+        let tracks =
+            triangulated(&recording, &lifted.iter().collect::<Vec<_>>(), &config::Geometry::default());
+        assert_eq!(tracks.len(), 1, "{tracks:#?}");
+        let track = &tracks[0];
+        assert_eq!(track.views.len(), 8);
+        for end in &ends {
+            assert!(track.segment.line.distance(end) < 1.5e-3, "{}", track.segment.line.distance(end));
+        }
+        assert!((track.segment.length() - 0.7).abs() < 0.02);
+        assert!(track.position_std_m() < 0.01);
+    }
+
+    #[test]
+    fn two_edges_of_a_worktop_stay_two_lines() {
+        let recording = recording();
+        let edge = |z: f64| [Point::new(-0.4, 0.0, z), Point::new(0.4, 0.0, z)];
+        let mut lifted = lift(&recording, edge(0.0), |v| 0.01 * (v % 3) as f64);
+        lifted.extend(lift(&recording, edge(0.035), |v| -0.01 * (v % 2) as f64));
+        let tracks =
+            triangulated(&recording, &lifted.iter().collect::<Vec<_>>(), &config::Geometry::default());
+        let mut heights: Vec<f64> = tracks.iter().map(|t| t.segment.middle().z).collect();
+        heights.sort_by(f64::total_cmp);
+        assert_eq!(heights.len(), 2, "{heights:?}");
+        assert!(heights[0].abs() < 3e-3 && (heights[1] - 0.035).abs() < 3e-3, "{heights:?}");
+    }
 }

@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::articulation::{Action, Outcome};
 use crate::config;
-use crate::error::Result;
 use crate::hands::Trajectory;
 use crate::math::Point;
-use crate::recording::{Clip, Grid, HAND_CLASS, Recording};
+use crate::recording::sketch::Sketch;
+use crate::recording::{Clip, HAND_CLASS, Recording};
 
 /// The touched piece of furniture, coarsely: `V_conf`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -44,38 +44,29 @@ impl Region {
     }
 }
 
-/// A decoded local frame: its index, depth and mask.
-type LocalImage = (usize, Grid<f32>, Option<Grid<u8>>);
-
-/// Finds the confident region of one clip.
+/// Finds the confident region of one clip. `sketches` holds the frames of [`local_frames`].
+#[must_use]
 pub fn localize(
     recording: &Recording,
     clip: &Clip,
     trajectory: &Trajectory,
+    sketches: &BTreeMap<usize, Sketch>,
     config: &config::Localization,
-) -> Result<Outcome<Region>> {
+) -> Outcome<Region> {
     let grip = trajectory.closed_grip();
-    let frames = local_frames(recording, clip, trajectory, &grip, config);
+    let frames = local_frames(recording, clip, trajectory, config);
     let Some(&nearest) = frames.first() else {
-        return Ok(Outcome::Abstained("no frame with depth sees the grip while the furniture is closed".to_owned()));
+        return Outcome::Abstained("no frame with depth sees the grip while the furniture is closed".to_owned());
     };
-    let mut images: Vec<LocalImage> = Vec::new();
-    for &frame in &frames {
-        if let Some(depth) = recording.depth(frame)? {
-            images.push((frame, depth, recording.mask(frame)?));
-        }
-    }
+    let images: Vec<&Sketch> = frames.iter().filter_map(|f| sketches.get(f)).collect();
     let class = touched_class(recording, &images, &grip);
     let mut seen: Vec<(u32, Point)> = Vec::new();
-    for (view, (frame, depth, mask)) in images.iter().enumerate() {
-        for p in points(recording, *frame, depth, mask.as_ref(), class, config.pixel_step) {
-            if (p - grip).norm() <= config.reach_m {
-                seen.push((view as u32, p));
-            }
-        }
+    for (view, sketch) in images.iter().enumerate() {
+        let near = |p: &Point| (p - grip).norm() <= config.reach_m;
+        seen.extend(points(recording, sketch, class).into_iter().filter(near).map(|p| (view as u32, p)));
     }
     if seen.is_empty() {
-        return Ok(Outcome::Abstained("no depth within reach of the hand in the local frames".to_owned()));
+        return Outcome::Abstained("no depth within reach of the hand in the local frames".to_owned());
     }
     let counts = voxels::count_views(&seen, config.voxel_m);
     // Fewer views than asked for where nothing reaches them: a coarse region is better than none, and it says so.
@@ -91,7 +82,7 @@ pub fn localize(
                 .filter(|(_, p)| inside.contains(&voxels::index(p, config.voxel_m)))
                 .map(|(_, p)| *p)
                 .collect();
-            return Ok(Outcome::Found(Region {
+            return Outcome::Found(Region {
                 voxel_m: config.voxel_m,
                 voxels: connected,
                 min_views,
@@ -100,56 +91,41 @@ pub fn localize(
                 local_frames: frames,
                 viewpoint: recording.frames[nearest].center(),
                 grip,
-            }));
+            });
         }
     }
-    Ok(Outcome::Abstained("no confident voxels near the hand".to_owned()))
+    Outcome::Abstained("no confident voxels near the hand".to_owned())
 }
 
-/// World points of a frame's depth, hands and other classes left out.
+/// World points of a frame's depth, hands and (where there are masks) other classes left out.
 #[must_use]
-pub fn points(
-    recording: &Recording,
-    frame: usize,
-    depth: &Grid<f32>,
-    mask: Option<&Grid<u8>>,
-    class: Option<u8>,
-    step: usize,
-) -> Vec<Point> {
-    let pose = &recording.frames[frame].world_from_camera;
-    let step = step.max(1);
+pub fn points(recording: &Recording, sketch: &Sketch, class: Option<u8>) -> Vec<Point> {
+    let pose = &recording.frames[sketch.frame].world_from_camera;
+    let factor = recording.depth_factor(sketch.frame);
+    let width = sketch.depth.width;
     let mut out = Vec::new();
-    for y in (0..depth.height).step_by(step) {
-        for x in (0..depth.width).step_by(step) {
-            let z = depth.data[y * depth.width + x];
-            if z <= 0.0 || !z.is_finite() {
-                continue;
-            }
-            if let Some(mask) = mask {
-                let here = mask.data[y * depth.width + x];
-                if here == HAND_CLASS || class.is_some_and(|c| here != c) {
-                    continue;
-                }
-            }
-            out.push(pose * recording.camera.unproject(x as f64, y as f64, f64::from(z)));
+    for i in 0..sketch.depth.data.len() {
+        if sketch.has_mask && class.is_some_and(|c| sketch.class.data[i] != c) {
+            continue;
+        }
+        if let Some(p) = sketch.point(&recording.camera, i % width, i / width) {
+            out.push(pose * Point::from(p.coords * factor));
         }
     }
     out
 }
 
 /// Frames from which the region is built, the one nearest to the interaction first.
-fn local_frames(
+#[must_use]
+pub fn local_frames(
     recording: &Recording,
     clip: &Clip,
     trajectory: &Trajectory,
-    grip: &Point,
     config: &config::Localization,
 ) -> Vec<usize> {
+    let grip = &trajectory.closed_grip();
     let [first, last] = trajectory.contact_frames();
-    let usable = |frame: &usize| {
-        let f = &recording.frames[*frame];
-        (f.files.depth.is_some() || !recording.reconstruction.is_empty()) && sees(recording, *frame, grip)
-    };
+    let usable = |frame: &usize| recording.has_depth(*frame) && sees(recording, *frame, grip);
     if !config.closed_state_frames {
         let active: Vec<usize> = (first..=last).filter(usable).collect();
         return spread(&active, config.local_frames);
@@ -197,21 +173,24 @@ fn sees(recording: &Recording, frame: usize, p: &Point) -> bool {
 }
 
 /// The class that most pixels around the grip show, at the grip's depth, in frames that see it.
-fn touched_class(recording: &Recording, images: &[LocalImage], grip: &Point) -> Option<u8> {
+fn touched_class(recording: &Recording, images: &[&Sketch], grip: &Point) -> Option<u8> {
     // A fist's size around the grip, and the depth of a handle with its face behind it.
     const RADIUS_M: f64 = 0.06;
     const DEPTH_M: f64 = 0.12;
     let mut votes: BTreeMap<u8, usize> = BTreeMap::new();
-    for (frame, depth, mask) in images {
-        let Some(mask) = mask else { continue };
-        let local = recording.frames[*frame].world_from_camera.inverse() * grip;
+    for sketch in images.iter().filter(|s| s.has_mask) {
+        let local = recording.frames[sketch.frame].world_from_camera.inverse() * grip;
         let Some((u, v)) = recording.camera.project(&local) else { continue };
-        let radius = (RADIUS_M / local.z * recording.camera.fx).clamp(3.0, 80.0) as i64;
-        for dy in -radius..=radius {
-            for dx in -radius..=radius {
-                let (x, y) = (u + dx as f64, v + dy as f64);
-                let (Some(class), Some(z)) = (mask.nearest(x, y), depth.nearest(x, y)) else { continue };
-                if class != 0 && class != HAND_CLASS && z > 0.0 && (f64::from(z) - local.z).abs() < DEPTH_M {
+        let radius = (RADIUS_M / local.z * recording.camera.fx).clamp(3.0, 160.0);
+        let factor = recording.depth_factor(sketch.frame);
+        let step = sketch.step as f64;
+        let reach = (radius / step).ceil() as i64;
+        for dy in -reach..=reach {
+            for dx in -reach..=reach {
+                let Some((x, y)) = sketch.sample(u + dx as f64 * step, v + dy as f64 * step) else { continue };
+                let i = y * sketch.depth.width + x;
+                let (class, z) = (sketch.class.data[i], f64::from(sketch.depth.data[i]) * factor);
+                if class != 0 && class != HAND_CLASS && z > 0.0 && (z - local.z).abs() < DEPTH_M {
                     *votes.entry(class).or_default() += 1;
                 }
             }

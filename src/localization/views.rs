@@ -14,11 +14,8 @@ use super::Region;
 pub fn reselect(recording: &Recording, region: &Region, config: &config::Localization) -> Vec<usize> {
     let centers = region.centers();
     let Some(middle) = centroid(&centers) else { return Vec::new() };
-    let interacting = |frame: usize| {
-        recording.clips.iter().any(|c| c.end_frame > c.start_frame && (c.start_frame..=c.end_frame).contains(&frame))
-    };
     let mut candidates: Vec<usize> = (0..recording.frames.len())
-        .filter(|&f| !interacting(f) && recording.frames[f].files.rgb.is_some())
+        .filter(|&f| !interacting(recording, f) && recording.frames[f].files.rgb.is_some())
         .filter(|&f| visible_share(recording, f, &centers) >= config.min_visible_share)
         .collect();
     // The local frames show the closed state from near by, whatever the clips' bounds say.
@@ -26,20 +23,40 @@ pub fn reselect(recording: &Recording, region: &Region, config: &config::Localiz
     candidates.sort_unstable();
     candidates.dedup();
 
+    let distance = |f: usize| (recording.frames[f].center() - middle).norm();
+    let start = (0..candidates.len())
+        .min_by(|&a, &b| distance(candidates[a]).total_cmp(&distance(candidates[b])))
+        .unwrap_or(0);
+    spread(recording, &candidates, start, config.global_views)
+}
+
+/// Up to `count` frames outside the interactions, spread over camera positions: what the room looks like when nothing moves.
+#[must_use]
+pub fn survey(recording: &Recording, count: usize) -> Vec<usize> {
+    let candidates: Vec<usize> =
+        (0..recording.frames.len()).filter(|&f| !interacting(recording, f) && recording.has_depth(f)).collect();
+    spread(recording, &candidates, 0, count)
+}
+
+/// Whether a narrated interaction is going on.
+fn interacting(recording: &Recording, frame: usize) -> bool {
+    recording.clips.iter().any(|c| c.end_frame > c.start_frame && (c.start_frame..=c.end_frame).contains(&frame))
+}
+
+/// Farthest-point sampling over camera positions from `candidates[start]` on; ascending.
+fn spread(recording: &Recording, candidates: &[usize], start: usize, count: usize) -> Vec<usize> {
     let position = |f: usize| recording.frames[f].center();
     let mut distance: Vec<f64> = vec![f64::INFINITY; candidates.len()];
     let mut chosen = Vec::new();
-    let mut next = (0..candidates.len()).min_by(|&a, &b| {
-        (position(candidates[a]) - middle).norm().total_cmp(&(position(candidates[b]) - middle).norm())
-    });
+    let mut next = (start < candidates.len()).then_some(start);
     while let Some(i) = next {
         chosen.push(candidates[i]);
-        if chosen.len() >= config.global_views.min(candidates.len()) {
+        if chosen.len() >= count.min(candidates.len()) {
             break;
         }
         let from = position(candidates[i]);
         distance[i] = f64::NEG_INFINITY;
-        for (d, &f) in distance.iter_mut().zip(&candidates) {
+        for (d, &f) in distance.iter_mut().zip(candidates) {
             *d = d.min((position(f) - from).norm());
         }
         next = (0..candidates.len())

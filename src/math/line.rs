@@ -43,6 +43,13 @@ pub struct Segment {
 }
 
 impl Segment {
+    /// From one point to another; `None` where they coincide.
+    #[must_use]
+    pub fn between(a: &Point, b: &Point) -> Option<Self> {
+        let direction = super::unit(&(b - a))?;
+        Some(Self { line: Line { point: *a, direction }, span: [0.0, (b - a).norm()] })
+    }
+
     /// The two end points.
     #[must_use]
     pub fn ends(&self) -> [Point; 2] {

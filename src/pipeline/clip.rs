@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::ClipResult;
 use crate::articulation::Outcome;
-use crate::config::Config;
+use crate::config::{Config, LineMethod};
 use crate::error::Result;
 use crate::geometry::moved::{self, Rect};
 use crate::geometry::segments::{LiftedSegment, ViewGeometry};
@@ -15,7 +15,32 @@ use crate::localization::{self, Region, views};
 use crate::math::Point;
 use crate::reasoning::{PartShape, Question, Reasoner};
 use crate::recording::narration::{self, Reading};
+use crate::recording::sketch::Sketch;
 use crate::recording::{Clip, Recording};
+
+/// A clip after its hand was followed.
+pub(super) struct Followed {
+    reading: Reading,
+    /// The hand, or the reason why there is none.
+    hand: Outcome<Trajectory>,
+    /// Frames whose depth the next steps need.
+    pub(super) frames: Vec<usize>,
+}
+
+pub(super) fn follow(recording: &Recording, clip: &Clip, config: &Config) -> Followed {
+    let reading = narration::read(clip);
+    let hand = if reading.moves_joint == Some(false) {
+        Outcome::Abstained(format!("the narration \"{}\" moves no door or drawer", clip.narration))
+    } else {
+        hands::trajectory(recording, clip, &reading, &config.hands)
+    };
+    let frames = hand.found().map_or_else(Vec::new, |t| {
+        let mut frames = localization::local_frames(recording, clip, t, &config.localization);
+        frames.extend(moved::open_frames(recording, clip, t).into_iter().map(|(f, _)| f));
+        frames
+    });
+    Followed { reading, hand, frames }
+}
 
 /// A clip after hands and localisation.
 pub(super) struct Located {
@@ -26,21 +51,23 @@ pub(super) struct Located {
     reason: Option<String>,
 }
 
-pub(super) fn locate(recording: &Recording, clip: &Clip, config: &Config) -> Result<Located> {
-    let reading = narration::read(clip);
-    let mut located = Located { reading, trajectory: None, region: None, views: Vec::new(), reason: None };
-    if located.reading.moves_joint == Some(false) {
-        located.reason = Some(format!("the narration \"{}\" moves no door or drawer", clip.narration));
-        return Ok(located);
-    }
-    let trajectory = match hands::trajectory(recording, clip, &located.reading, &config.hands) {
+pub(super) fn locate(
+    recording: &Recording,
+    clip: &Clip,
+    followed: Followed,
+    sketches: &BTreeMap<usize, Sketch>,
+    config: &Config,
+) -> Located {
+    let mut located =
+        Located { reading: followed.reading, trajectory: None, region: None, views: Vec::new(), reason: None };
+    let trajectory = match followed.hand {
         Outcome::Found(t) => t,
         Outcome::Abstained(reason) => {
             located.reason = Some(reason);
-            return Ok(located);
+            return located;
         }
     };
-    match localization::localize(recording, clip, &trajectory, &config.localization)? {
+    match localization::localize(recording, clip, &trajectory, sketches, &config.localization) {
         Outcome::Found(region) => {
             located.views = views::reselect(recording, &region, &config.localization);
             located.region = Some(region);
@@ -48,7 +75,17 @@ pub(super) fn locate(recording: &Recording, clip: &Clip, config: &Config) -> Res
         Outcome::Abstained(reason) => located.reason = Some(reason),
     }
     located.trajectory = Some(trajectory);
-    Ok(located)
+    located
+}
+
+/// What the whole scene's views show.
+#[derive(Clone, Copy)]
+pub(super) struct Seen<'a> {
+    pub(super) sketches: &'a BTreeMap<usize, Sketch>,
+    pub(super) lifted: &'a BTreeMap<usize, ViewGeometry>,
+    /// Triangulated lines.
+    pub(super) lines: &'a [LineTrack],
+    pub(super) room: Option<&'a ManhattanFrame>,
 }
 
 /// Everything from the clip's lines to its joint.
@@ -56,8 +93,7 @@ pub(super) fn infer(
     recording: &Recording,
     clip: &Clip,
     located: Located,
-    lifted: &BTreeMap<usize, ViewGeometry>,
-    room: Option<&ManhattanFrame>,
+    seen: &Seen,
     reasoner: &dyn Reasoner,
     config: &Config,
 ) -> Result<ClipResult> {
@@ -75,16 +111,21 @@ pub(super) fn infer(
     };
     let (Some(trajectory), Some(region)) = (&result.trajectory, &result.region) else { return Ok(result) };
 
-    let in_views: Vec<&LiftedSegment> =
-        result.views.iter().filter_map(|v| lifted.get(v)).flat_map(|g| &g.segments).collect();
-    result.lines = tracks::build(&in_views, region, &config.geometry, config.seed);
-    let surface = surface(region, &result.views, lifted, config.localization.reach_m);
+    result.lines = match config.geometry.lines {
+        LineMethod::Triangulated => tracks::at_region(seen.lines, region),
+        LineMethod::Unprojected => {
+            let in_views: Vec<&LiftedSegment> =
+                result.views.iter().filter_map(|v| seen.lifted.get(v)).flat_map(|g| &g.segments).collect();
+            tracks::unprojected(&in_views, region, &config.geometry, config.seed)
+        }
+    };
+    let surface = surface(recording, region, &result.views, seen.sketches, config.localization.reach_m);
     let around = face::Surroundings {
         surface: &surface,
         grips: [region.grip, trajectory.open_grip()],
         viewpoint: region.viewpoint,
-        manhattan: room,
-        up: upward(recording, room),
+        manhattan: seen.room,
+        up: upward(recording, seen.room),
     };
     result.face = face::fit(&around, &config.geometry, config.seed);
 
@@ -99,7 +140,7 @@ pub(super) fn infer(
             face: result.face.as_ref(),
             rect: result.part.as_ref(),
             tracks: &result.lines,
-            manhattan: room,
+            manhattan: seen.room,
             grip: region.grip,
             path: &path,
         },
@@ -149,12 +190,17 @@ fn upward(recording: &Recording, room: Option<&ManhattanFrame>) -> crate::math::
 }
 
 /// Points of the touched furniture: of the local frames, and of the global views where masks tell what belongs to it.
-fn surface(region: &Region, views: &[usize], lifted: &BTreeMap<usize, ViewGeometry>, reach_m: f64) -> Vec<Point> {
+fn surface(
+    recording: &Recording,
+    region: &Region,
+    views: &[usize],
+    sketches: &BTreeMap<usize, Sketch>,
+    reach_m: f64,
+) -> Vec<Point> {
     let mut points = region.points.clone();
-    let of_class = |class: u8| region.class.is_none_or(|c| c == class);
-    for geometry in views.iter().filter_map(|v| lifted.get(v)) {
-        let here = geometry.points.iter().filter(|(p, c)| of_class(*c) && (p - region.grip).norm() <= reach_m);
-        points.extend(here.map(|(p, _)| *p));
+    for sketch in views.iter().filter_map(|v| sketches.get(v)) {
+        let near = |p: &Point| (p - region.grip).norm() <= reach_m;
+        points.extend(localization::points(recording, sketch, region.class).into_iter().filter(near));
     }
     points
 }

@@ -9,17 +9,18 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::articulation::{Articulation, Outcome};
-use crate::config::Config;
+use crate::config::{Config, LineMethod};
 use crate::error::{Error, Result};
 use crate::geometry::moved::Rect;
-use crate::geometry::segments::{LineDetector, ViewGeometry, lift_view};
-use crate::geometry::{AxisCandidate, Face, LineTrack, ManhattanFrame, manhattan};
+use crate::geometry::segments::{LiftedSegment, LineDetector, ViewGeometry, lift_view};
+use crate::geometry::{AxisCandidate, Face, LineTrack, ManhattanFrame, depth_scale, manhattan, tracks};
 use crate::hands::Trajectory;
 use crate::inference::ClipJoint;
-use crate::localization::Region;
+use crate::localization::{Region, views};
 use crate::math::Point;
 use crate::reasoning::{Answer, Reasoner};
-use crate::recording::{Clip, Recording};
+use crate::recording::sketch::Sketch;
+use crate::recording::{Clip, DepthFactors, Recording};
 
 /// Everything that was found out about one clip, step by step.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -76,6 +77,8 @@ pub struct Scene {
     pub recording: String,
     /// The room's frame (§A.5).
     pub manhattan: Option<ManhattanFrame>,
+    /// What the frames' depth was multiplied by.
+    pub depth_factors: DepthFactors,
     /// Clips in the recording's order.
     pub clips: Vec<ClipResult>,
     /// Joints in the order of their first clip.
@@ -98,51 +101,104 @@ pub fn infer(
     progress: Progress,
 ) -> Result<Scene> {
     check_depth(recording)?;
-    // Hands and localisation, clip by clip.
-    let total = recording.clips.len();
     let counter = std::sync::atomic::AtomicUsize::new(0);
+    let start = |step: &str, total: usize| {
+        counter.store(0, std::sync::atomic::Ordering::Relaxed);
+        progress(step, 0, total);
+    };
     let tick = |step: &str, total: usize| {
         let done = counter.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
         progress(step, done, total);
     };
+
+    // Hands, clip by clip; they tell which frames are needed.
+    let followed: Vec<clip::Followed> =
+        recording.clips.par_iter().map(|clip| clip::follow(recording, clip, config)).collect();
+    let mut sketches: BTreeMap<usize, Sketch> = BTreeMap::new();
+    let sketch = |sketches: &mut BTreeMap<usize, Sketch>, frames: Vec<usize>| -> Result<()> {
+        let fresh: Vec<usize> = frames.into_iter().filter(|f| !sketches.contains_key(f)).collect();
+        start("reading depth", fresh.len());
+        let loaded: Vec<Option<Sketch>> = fresh
+            .par_iter()
+            .map(|&frame| {
+                let sketch = Sketch::load(recording, frame);
+                tick("reading depth", fresh.len());
+                sketch
+            })
+            .collect::<Result<_>>()?;
+        sketches.extend(loaded.into_iter().flatten().map(|s| (s.frame, s)));
+        Ok(())
+    };
+    let mut first: Vec<usize> = followed.iter().flat_map(|f| f.frames.iter().copied()).collect();
+    if config.geometry.depth_scale {
+        first.extend(views::survey(recording, config.localization.survey_frames));
+    }
+    sort_unique(&mut first);
+    sketch(&mut sketches, first)?;
+    let rectified = |sketches: &BTreeMap<usize, Sketch>| {
+        let depth_factors =
+            if config.geometry.depth_scale { depth_scale::solve(recording, sketches) } else { DepthFactors::default() };
+        Recording { depth_factors, ..recording.clone() }
+    };
+    let metric = rectified(&sketches);
+
+    let total = recording.clips.len();
+    start("localising", total);
     let located: Vec<clip::Located> = recording
         .clips
         .par_iter()
-        .map(|clip| {
-            let located = clip::locate(recording, clip, config);
+        .zip(followed)
+        .map(|(clip, followed)| {
+            let located = clip::locate(&metric, clip, followed, &sketches, config);
             tick("localising", total);
             located
         })
-        .collect::<Result<_>>()?;
+        .collect();
 
     // Every global view is decoded once, however many clips look through it.
     let mut wanted: Vec<usize> = located.iter().flat_map(|l| l.views.iter().copied()).collect();
-    wanted.sort_unstable();
-    wanted.dedup();
-    counter.store(0, std::sync::atomic::Ordering::Relaxed);
+    sort_unique(&mut wanted);
+    sketch(&mut sketches, wanted.clone())?;
+    let metric = rectified(&sketches);
+    start("finding lines", wanted.len());
     let lifted: BTreeMap<usize, ViewGeometry> = wanted
         .par_iter()
         .map(|&view| {
-            let geometry = lift_view(recording, view, detector, &config.geometry, config.seed)?;
+            let geometry = lift_view(&metric, view, detector, &config.geometry, config.seed)?;
             tick("finding lines", wanted.len());
             Ok((view, geometry))
         })
         .collect::<Result<_>>()?;
-    let room = manhattan::estimate(recording, &with_normals_first(recording, &wanted), &config.geometry)?;
+    let room = manhattan::estimate(&metric, &with_normals_first(recording, &wanted), &config.geometry)?;
 
-    counter.store(0, std::sync::atomic::Ordering::Relaxed);
+    let lines = match config.geometry.lines {
+        LineMethod::Triangulated => {
+            let segments: Vec<&LiftedSegment> = lifted.values().flat_map(|g| &g.segments).collect();
+            tracks::triangulated(&metric, &segments, &config.geometry)
+        }
+        LineMethod::Unprojected => Vec::new(),
+    };
+
+    start("inferring", total);
+    let seen = clip::Seen { sketches: &sketches, lifted: &lifted, lines: &lines, room: room.as_ref() };
     let clips: Vec<ClipResult> = recording
         .clips
         .par_iter()
         .zip(located)
         .map(|(clip, located)| {
-            let result = clip::infer(recording, clip, located, &lifted, room.as_ref(), reasoner, config);
+            let result = clip::infer(&metric, clip, located, &seen, reasoner, config);
             tick("inferring", total);
             result
         })
         .collect::<Result<_>>()?;
-    let joints = scene::merge(recording, &clips, reasoner, config)?;
-    Ok(Scene { recording: recording.name.clone(), manhattan: room, clips, joints })
+    let joints = scene::merge(&metric, &clips, reasoner, config)?;
+    let Recording { name: recording, depth_factors, .. } = metric;
+    Ok(Scene { recording, manhattan: room, depth_factors, clips, joints })
+}
+
+fn sort_unique(frames: &mut Vec<usize>) {
+    frames.sort_unstable();
+    frames.dedup();
 }
 
 /// Zero depth everywhere, or depth in another unit than the hands, is an export gone wrong, not a scene; a few frames tell.

@@ -6,6 +6,8 @@ pub mod grid;
 pub mod images;
 pub mod narration;
 mod read;
+pub mod segments;
+pub mod sketch;
 pub mod trajectory;
 
 use std::collections::BTreeMap;
@@ -68,6 +70,8 @@ pub struct FrameFiles {
     pub normals: Option<PathBuf>,
     /// Class per pixel.
     pub mask: Option<PathBuf>,
+    /// A line detector's own segments.
+    pub segments: Option<PathBuf>,
 }
 
 /// One frame of the video.
@@ -159,6 +163,31 @@ pub struct Recording {
     pub labels: BTreeMap<u8, String>,
     /// Points of a static reconstruction (`reconstruction.ply` or `.obj`), world frame; empty where there is none.
     pub reconstruction: Vec<Point>,
+    /// What depth files are multiplied by when they are read.
+    pub depth_factors: DepthFactors,
+}
+
+/// What each frame's depth has to be multiplied by to be metric.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DepthFactors {
+    /// Frames whose factor is known.
+    pub by_frame: BTreeMap<usize, f64>,
+    /// The factor of all other frames.
+    pub other: f64,
+}
+
+impl Default for DepthFactors {
+    fn default() -> Self {
+        Self { by_frame: BTreeMap::new(), other: 1.0 }
+    }
+}
+
+impl DepthFactors {
+    /// The factor of a frame.
+    #[must_use]
+    pub fn of(&self, frame: usize) -> f64 {
+        self.by_frame.get(&frame).copied().unwrap_or(self.other)
+    }
 }
 
 impl Recording {
@@ -173,14 +202,39 @@ impl Recording {
         Vector::z()
     }
 
-    /// Depth in metres along the optical axis; 0 = none. A frame without a depth file gets the static reconstruction as
-    /// seen from it; `None` where there is neither.
+    /// Depth in metres along the optical axis, times the frame's factor; 0 = none. A frame without a depth file gets the
+    /// static reconstruction as seen from it; `None` where there is neither.
     pub fn depth(&self, frame: usize) -> Result<Option<Grid<f32>>> {
+        let mut depth = self.depth_as_read(frame)?;
+        let factor = self.depth_factor(frame) as f32;
+        if let Some(depth) = &mut depth
+            && factor != 1.0
+        {
+            depth.data.iter_mut().for_each(|z| *z *= factor);
+        }
+        Ok(depth)
+    }
+
+    /// The same without the frame's factor.
+    pub fn depth_as_read(&self, frame: usize) -> Result<Option<Grid<f32>>> {
         let depth = self.read(frame, |f| f.depth.as_ref(), images::depth)?;
         if depth.is_some() || self.reconstruction.is_empty() {
             return Ok(depth);
         }
         Ok(self.frames.get(frame).map(|f| images::splat(&self.reconstruction, &f.world_from_camera, &self.camera)))
+    }
+
+    /// What a frame's depth is multiplied by. A reconstruction is in the world already: its factor is 1.
+    #[must_use]
+    pub fn depth_factor(&self, frame: usize) -> f64 {
+        let has_file = self.frames.get(frame).is_some_and(|f| f.files.depth.is_some());
+        if has_file { self.depth_factors.of(frame) } else { 1.0 }
+    }
+
+    /// Whether a frame has depth: its own, or the reconstruction's.
+    #[must_use]
+    pub fn has_depth(&self, frame: usize) -> bool {
+        self.frames.get(frame).is_some_and(|f| f.files.depth.is_some()) || !self.reconstruction.is_empty()
     }
 
     /// Mask classes. `None` where the frame has no mask file.
@@ -196,6 +250,11 @@ impl Recording {
     /// Unit normals in the camera frame; zero = none. `None` where the frame has no normals file.
     pub fn normals(&self, frame: usize) -> Result<Option<Grid<[f32; 3]>>> {
         self.read(frame, |f| f.normals.as_ref(), images::normals)
+    }
+
+    /// A line detector's own segments. `None` where the frame has no such file.
+    pub fn segments(&self, frame: usize) -> Result<Option<Vec<segments::Ends>>> {
+        self.frames.get(frame).and_then(|f| f.files.segments.as_deref()).map(segments::read).transpose()
     }
 
     fn read<T>(

@@ -122,7 +122,17 @@ pub(super) fn open(dir: &Path) -> Result<Recording> {
         .ok()
         .and_then(|d| d.file_name().map(|n| n.to_string_lossy().into_owned()))
         .unwrap_or_else(|| "recording".to_owned());
-    Ok(Recording { name, dir: dir.to_owned(), camera, frames, clips: clips.clips, hands, labels, reconstruction })
+    Ok(Recording {
+        name,
+        dir: dir.to_owned(),
+        camera,
+        frames,
+        clips: clips.clips,
+        hands,
+        labels,
+        reconstruction,
+        depth_factors: super::DepthFactors::default(),
+    })
 }
 
 fn check_camera(file: &CamerasFile, faults: &mut Faults) -> Camera {
@@ -211,6 +221,10 @@ fn frames(dir: &Path, file: &CamerasFile, faults: &mut Faults) -> Vec<Frame> {
                 depth: optional("depth", index),
                 normals: optional("normals", index),
                 mask: optional("masks", index),
+                segments: [format!("{index:06}.npz"), format!("{index:06}.txt"), format!("segments_{index}.txt")]
+                    .map(|name| dir.join("segments").join(name))
+                    .into_iter()
+                    .find(|path| path.is_file()),
             },
         });
     }

@@ -210,6 +210,7 @@ impl Recorded {
                     "true_start_frame": c.true_span[0], "x_start": x.first(), "x_end": x.last(), "x": x}))
             })
             .collect();
-        json!({"generator": "paws synth", "seed": self.options.seed, "up": Vector::z(), "joints": joints, "clips": clips})
+        json!({"generator": "paws synth", "seed": self.options.seed, "up": Vector::z(), "depth_scale": self.seen.depth_scale,
+            "joints": joints, "clips": clips})
     }
 }

@@ -1,0 +1,90 @@
+//! `paws measure`: what the steps before the joint inference are worth.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::output::write_file;
+use super::progress::Steps;
+use super::{Answer, ConfigFile, print};
+use crate::evaluation::stages::{SceneTruth, Stages, measure};
+use crate::geometry::segments::Lsd;
+use crate::json;
+use crate::math::stats;
+use crate::pipeline;
+use crate::recording::Recording;
+use crate::report::table::aligned;
+
+#[derive(Debug, Args)]
+pub struct MeasureArgs {
+    /// Recordings with a ground_truth.json
+    #[arg(required = true)]
+    recordings: Vec<PathBuf>,
+    /// One line a recording as well
+    #[arg(long)]
+    each: bool,
+    /// Write all numbers as JSON to this file
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    #[command(flatten)]
+    config: ConfigFile,
+}
+
+pub fn run(args: &MeasureArgs) -> anyhow::Result<Answer> {
+    let config = args.config.read()?;
+    let mut opened = Vec::new();
+    for dir in &args.recordings {
+        opened.push((Recording::open(dir)?, SceneTruth::read(dir)?));
+    }
+    let mut rows = vec![HEADER.map(str::to_owned).to_vec()];
+    let mut all: Vec<Stages> = Vec::new();
+    let steps = Steps::new();
+    for (i, (recording, truth)) in opened.iter().enumerate() {
+        steps.report("measuring", i, opened.len());
+        let reasoner = super::twin::reasoner(&config);
+        let scene = pipeline::infer(recording, &config, &Lsd, &reasoner, &|_, _, _| {})?;
+        let stages = measure(&scene, truth);
+        if args.each {
+            rows.push(row(&recording.name, &stages));
+        }
+        all.push(stages);
+    }
+    steps.finish();
+    rows.push(row(&format!("{} recordings", all.len()), &Stages::pooled(&all)));
+    print(&aligned(&rows))?;
+    if let Some(path) = &args.json {
+        write_file(path, json::text(&all)?)?;
+    }
+    Ok(Answer::Yes)
+}
+
+const HEADER: [&str; 10] = [
+    "recordings",
+    "clips",
+    "localised",
+    "hinge line off by",
+    "and by",
+    "recall 3°, 3 cm",
+    "precision",
+    "room frame off by",
+    "front covered",
+    "depth scale off by",
+];
+
+fn row(name: &str, s: &Stages) -> Vec<String> {
+    let share = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.2}"));
+    let best = s.best_line();
+    let median = |values: &[f64]| stats::median(values);
+    vec![
+        name.to_owned(),
+        s.clips.to_string(),
+        s.localized.to_string(),
+        best.map_or("-".to_owned(), |b| format!("{:.1} cm", 100.0 * b[0])),
+        best.map_or("-".to_owned(), |b| format!("{:.2}°", b[1].to_degrees())),
+        share(s.recall()),
+        share(s.precision()),
+        median(&s.manhattan_rad).map_or("-".to_owned(), |a| format!("{:.2}°", a.to_degrees())),
+        share(median(&s.coverage)),
+        median(&s.depth_scale_error).map_or("-".to_owned(), |e| format!("{:.1} %", 100.0 * e)),
+    ]
+}

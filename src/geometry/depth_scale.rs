@@ -1,0 +1,233 @@
+//! The scale of each frame's depth, from surfaces that several frames see (ours).
+//!
+//! Metric depth estimates are off by a factor that changes from frame to frame. Where two frames look at one surface from
+//! different places, the distance between their camera centres, which is known, tells both factors: with the surface's
+//! normal n, the depth points x_a and x_b (world axes, about their own camera centres c_a and c_b) of one place satisfy
+//! `n . (c_a + s_a x_a - c_b - s_b x_b) = 0`. All frames are solved together, robustly.
+//!
+//! Depth is noisy and camera centres are not, so the equations are divided by the common factor s: with `s_i = s (1 + d_i)`
+//! and `t = 1 / s` they read `n . ((1 + d_a) x_a - (1 + d_b) x_b + t (c_a - c_b)) = 0`, where the noise stands on the side
+//! that least squares expects it on. Solved for s itself, noise would shrink it (by 10 % where cameras move little).
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::math::{Point, Vector, stats};
+use crate::recording::sketch::Sketch;
+use crate::recording::{Camera, DepthFactors, Recording};
+
+/// Surface samples of a frame that take part.
+const SAMPLES: usize = 700;
+/// Frames that each frame is compared with.
+const PARTNERS: usize = 10;
+/// Noise of one depth sample across its surface, metres: pixel noise, the bending of estimated depth and poses.
+const SAMPLE_STD_M: f64 = 0.02;
+/// Samples of a pair share their errors: together they are worth this many.
+const INDEPENDENT: f64 = 6.0;
+/// Spread of the frames' factors about their common one, and of the common one about 1.
+const FRAME_STD: f64 = 0.03;
+const COMMON_STD: f64 = 0.15;
+
+/// Surfaces this near to each other are taken for one: wide at first, to bridge the error of the scale, then narrow, to
+/// tell surfaces apart.
+const GATES_M: [f64; 3] = [0.2, 0.1, 0.05];
+/// Comparisons a gate at the most; each brings the places that are compared nearer to each other.
+const ROUNDS: usize = 25;
+
+/// A surface sample of a frame, world axes.
+struct Sample {
+    /// From the camera centre, depth as read.
+    offset: Vector,
+    normal: Vector,
+}
+
+struct View<'a> {
+    sketch: &'a Sketch,
+    center: Point,
+    samples: Vec<Sample>,
+}
+
+/// One comparison of two frames at one place.
+#[derive(Debug, Clone, Copy)]
+struct Link {
+    a: usize,
+    b: usize,
+    /// `n . x_a`, `n . x_b`, `n . (c_a - c_b)`.
+    coefficients: [f64; 3],
+}
+
+/// Solves the factors that each frame's depth has to be multiplied by: 1 where nothing tells, the common one for frames
+/// that are not among the sketches.
+#[must_use]
+pub fn solve(recording: &Recording, sketches: &BTreeMap<usize, Sketch>) -> DepthFactors {
+    let views: Vec<View> = sketches
+        .par_iter()
+        .filter(|(f, _)| recording.frames[**f].files.depth.is_some())
+        .map(|(_, s)| view(recording, s))
+        .collect();
+    if views.len() < 2 {
+        return DepthFactors::default();
+    }
+    let partners: Vec<Vec<usize>> = (0..views.len())
+        .into_par_iter()
+        .map(|a| partners(recording, &views, a))
+        .collect();
+    let mut factors = vec![1.0; views.len()];
+    'gates: for gate_m in GATES_M {
+        for _ in 0..ROUNDS {
+            let links: Vec<Vec<Link>> = partners
+                .par_iter()
+                .enumerate()
+                .map(|(a, others)| {
+                    others.iter().flat_map(|&b| compare(recording, &views, [a, b], &factors, gate_m)).collect()
+                })
+                .collect();
+            let Some(next) = adjust(&links, &factors, gate_m) else { break 'gates };
+            let moved = next.iter().zip(&factors).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            factors = next;
+        if std::env::var_os("DBG").is_some() { let n: usize = links.iter().map(Vec::len).sum(); let rms = (links.iter().flatten().map(|l| l.residual(&factors).powi(2)).sum::<f64>() / n as f64).sqrt(); eprintln!("{gate_m} links {n} rms {rms:.4} moved {moved:.4} median {:.4}", stats::median(&factors).unwrap()); }
+            if moved < 5e-4 {
+                break;
+            }
+        }
+    }
+    let other = stats::median(&factors).unwrap_or(1.0);
+    DepthFactors { by_frame: views.iter().map(|v| v.sketch.frame).zip(factors).collect(), other }
+}
+
+fn view<'a>(recording: &Recording, sketch: &'a Sketch) -> View<'a> {
+    // Wide enough to average pixel noise, narrow enough for a drawer's front.
+    let reach = (sketch.depth.width / 40).max(2);
+    let pose = &recording.frames[sketch.frame].world_from_camera;
+    let area = sketch.depth.data.len();
+    let stride = ((area as f64 / SAMPLES as f64).sqrt().round() as usize).max(1);
+    let mut samples = Vec::new();
+    for y in (stride / 2..sketch.depth.height).step_by(stride) {
+        for x in (stride / 2..sketch.depth.width).step_by(stride) {
+            let Some(p) = sketch.point(&recording.camera, x, y) else { continue };
+            let Some(n) = sketch.normal(&recording.camera, x, y, reach) else { continue };
+            // Surfaces seen at a grazing angle have no usable normal.
+            if -n.dot(&p.coords.normalize()) > 0.25 {
+                samples.push(Sample { offset: pose.rotation * p.coords, normal: pose.rotation * n });
+            }
+        }
+    }
+    View { sketch, center: recording.frames[sketch.frame].center(), samples }
+}
+
+/// Frames that see what frame `a` sees from another distance: those that tell its factor best.
+fn partners(recording: &Recording, views: &[View], a: usize) -> Vec<usize> {
+    let from = &views[a];
+    let probes: Vec<&Sample> = from.samples.iter().step_by((from.samples.len() / 60).max(1)).collect();
+    // In a long recording every n-th frame is candidate enough.
+    let stride = (views.len() / 600).max(1);
+    let mut scored: Vec<(f64, usize)> = (0..views.len())
+        .filter(|&b| b != a && (a + b) % stride == 0)
+        .map(|b| {
+            let baseline = from.center - views[b].center;
+            let camera_from_world = recording.frames[views[b].sketch.frame].world_from_camera.inverse();
+            let told: f64 = probes
+                .iter()
+                .filter(|s| {
+                    let local = camera_from_world * (from.center + s.offset);
+                    local.z > 0.2
+                        && recording.camera.project(&local).is_some_and(|(u, v)| recording.camera.contains(u, v))
+                })
+                // More than half a metre hardly helps and sees other things.
+                .map(|s| s.normal.dot(&baseline).abs().min(0.5))
+                .sum();
+            (told, b)
+        })
+        .filter(|(told, _)| *told > 0.0)
+        .collect();
+    scored.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
+    // Half of the best, half spread over the rest: ratios between like views are worth something too.
+    let best = PARTNERS / 2;
+    let rest = scored.get(best..).unwrap_or_default();
+    let mut chosen: Vec<usize> = scored.iter().take(best).map(|s| s.1).collect();
+    chosen.extend(rest.iter().step_by((rest.len() / (PARTNERS - best)).max(1)).take(PARTNERS - best).map(|s| s.1));
+    chosen
+}
+
+/// Places of frame a that frame b sees too, under the present factors.
+fn compare(recording: &Recording, views: &[View], [a, b]: [usize; 2], factors: &[f64], gate_m: f64) -> Vec<Link> {
+    let (from, to) = (&views[a], &views[b]);
+    let pose = &recording.frames[to.sketch.frame].world_from_camera;
+    let camera: &Camera = &recording.camera;
+    let inverse = pose.inverse();
+    let baseline = from.center - to.center;
+    from.samples
+        .iter()
+        .filter_map(|s| {
+            let local = inverse * (from.center + s.offset * factors[a]);
+            let (u, v) = camera.project(&local).filter(|_| local.z > 0.2)?;
+            let (x, y) = to.sketch.sample(u, v)?;
+            let z = f64::from(to.sketch.depth.data[y * to.sketch.depth.width + x]);
+            if z <= 0.0 {
+                return None;
+            }
+            // Along the ray of the very pixel: the nearest sample's depth stands for it only on the surface's plane,
+            // which is what the gate then checks.
+            let (us, vs) = to.sketch.pixel(x, y);
+            let other = pose.rotation * camera.unproject(us, vs, z).coords;
+            let coefficients = [s.normal.dot(&s.offset), s.normal.dot(&other), s.normal.dot(&baseline)];
+            // A side of a board can lie in the plane's slab far from the place that was looked for.
+            let place = (from.center + s.offset * factors[a]) - (to.center + other * factors[b]);
+            let link = Link { a, b, coefficients };
+            (link.residual(factors).abs() <= gate_m && place.norm() <= gate_m + 0.05).then_some(link)
+        })
+        .collect()
+}
+
+impl Link {
+    fn residual(&self, factors: &[f64]) -> f64 {
+        let [xa, xb, base] = self.coefficients;
+        base + factors[self.a] * xa - factors[self.b] * xb
+    }
+}
+
+/// One robust least-squares step for all factors; `None` where the system cannot be solved.
+fn adjust(links: &[Vec<Link>], factors: &[f64], gate_m: f64) -> Option<Vec<f64>> {
+    let n = factors.len();
+    // Unknowns: each frame's d, then t of the common factor.
+    let mut matrix = DMatrix::<f64>::zeros(n + 1, n + 1);
+    let mut rhs = DVector::<f64>::zeros(n + 1);
+    for of_frame in links {
+        let mut start = 0;
+        while start < of_frame.len() {
+            let pair = of_frame[start].b;
+            let end = start + of_frame[start..].iter().take_while(|l| l.b == pair).count();
+            let members = &of_frame[start..end];
+            start = end;
+            // A few coincidences are no common surface.
+            if members.len() < 12 {
+                continue;
+            }
+            let weight = (INDEPENDENT / members.len() as f64).min(1.0) / SAMPLE_STD_M.powi(2);
+            for link in members {
+                let residual = link.residual(factors);
+                let scale = (0.4 * gate_m).max(SAMPLE_STD_M);
+                let w = weight / (1.0 + (residual / scale).powi(2)).powi(2);
+                let [xa, xb, base] = link.coefficients;
+                let row = [(link.a, xa), (link.b, -xb), (n, base)];
+                for (i, x) in row {
+                    for (j, y) in row {
+                        matrix[(i, j)] += w * x * y;
+                    }
+                    rhs[i] -= w * x * (xa - xb);
+                }
+            }
+        }
+    }
+    for i in 0..n {
+        matrix[(i, i)] += FRAME_STD.powi(-2);
+    }
+    matrix[(n, n)] += COMMON_STD.powi(-2);
+    rhs[n] += COMMON_STD.powi(-2);
+    let solved = matrix.cholesky()?.solve(&rhs);
+    let next: Vec<f64> = solved.iter().take(n).map(|d| (1.0 + d) / solved[n]).collect();
+    // Half or twice the depth is a broken export, which is told elsewhere.
+    next.iter().all(|s| (0.5..2.0).contains(s)).then_some(next)
+}

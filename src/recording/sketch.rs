@@ -1,0 +1,129 @@
+//! A frame's depth and mask at every n-th pixel: small enough to keep for hundreds of frames.
+
+use super::{Camera, Grid, HAND_CLASS, Recording};
+use crate::error::Result;
+use crate::math::{Point, Vector, unit};
+
+/// Samples kept of a frame at the most.
+const MAX_SAMPLES: usize = 20_000;
+
+/// Depth and mask class of a frame on a regular grid of its pixels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sketch {
+    /// Frame index.
+    pub frame: usize,
+    /// Pixels between samples.
+    pub step: usize,
+    /// Depth along the optical axis as read (no factor applied), metres; 0 = none, or a hand.
+    pub depth: Grid<f32>,
+    /// Mask class; 0 where there is no mask.
+    pub class: Grid<u8>,
+    /// Whether the frame has a mask.
+    pub has_mask: bool,
+}
+
+impl Sketch {
+    /// Decodes a frame; `None` where it has no depth.
+    pub fn load(recording: &Recording, frame: usize) -> Result<Option<Self>> {
+        let Some(depth) = recording.depth_as_read(frame)? else { return Ok(None) };
+        let mask = recording.mask(frame)?;
+        Ok(Some(Self::of(frame, &depth, mask.as_ref())))
+    }
+
+    /// Samples decoded images of one size.
+    #[must_use]
+    pub fn of(frame: usize, depth: &Grid<f32>, mask: Option<&Grid<u8>>) -> Self {
+        let step = ((depth.data.len() as f64 / MAX_SAMPLES as f64).sqrt().ceil() as usize).max(1);
+        let (width, height) = (depth.width / step, depth.height / step);
+        let mut out = Self {
+            frame,
+            step,
+            depth: Grid::filled(width, height, 0.0),
+            class: Grid::filled(width, height, 0),
+            has_mask: mask.is_some(),
+        };
+        for y in 0..height {
+            for x in 0..width {
+                let source = (y * step + step / 2) * depth.width + x * step + step / 2;
+                let class = mask.map_or(0, |m| m.data[source]);
+                let z = depth.data[source];
+                out.class.data[y * width + x] = class;
+                if z > 0.0 && z.is_finite() && class != HAND_CLASS {
+                    out.depth.data[y * width + x] = z;
+                }
+            }
+        }
+        out
+    }
+
+    /// Pixel of the full image at sample (x, y).
+    #[must_use]
+    pub fn pixel(&self, x: usize, y: usize) -> (f64, f64) {
+        ((x * self.step + self.step / 2) as f64, (y * self.step + self.step / 2) as f64)
+    }
+
+    /// Sample nearest to a pixel of the full image; `None` outside.
+    #[must_use]
+    pub fn sample(&self, u: f64, v: f64) -> Option<(usize, usize)> {
+        let at = |c: f64| ((c - (self.step / 2) as f64) / self.step as f64).round();
+        let (x, y) = (at(u), at(v));
+        (x >= 0.0 && y >= 0.0 && x < self.depth.width as f64 && y < self.depth.height as f64)
+            .then_some((x as usize, y as usize))
+    }
+
+    /// Point of a sample in the camera frame, with depth as read; `None` where there is none.
+    #[must_use]
+    pub fn point(&self, camera: &Camera, x: usize, y: usize) -> Option<Point> {
+        let z = f64::from(self.depth.data[y * self.depth.width + x]);
+        let (u, v) = self.pixel(x, y);
+        (z > 0.0).then(|| camera.unproject(u, v, z))
+    }
+
+    /// Normal of the surface at a sample, camera frame, facing the camera: the slope over `reach` samples to each side.
+    /// `None` at the rim, at depth edges and in holes.
+    #[must_use]
+    pub fn normal(&self, camera: &Camera, x: usize, y: usize, reach: usize) -> Option<Vector> {
+        let centre = self.point(camera, x, y)?;
+        let (x0, y0) = (x.checked_sub(reach)?, y.checked_sub(reach)?);
+        let (x1, y1) = (x + reach, y + reach);
+        if x1 >= self.depth.width || y1 >= self.depth.height {
+            return None;
+        }
+        let (left, right) = (self.point(camera, x0, y)?, self.point(camera, x1, y)?);
+        let (above, below) = (self.point(camera, x, y0)?, self.point(camera, x, y1)?);
+        // Both sides of a pixel lie on one plane; at an edge the middle does not lie between them. In inverse depth a
+        // plane is linear in the image.
+        let bend = |a: &Point, b: &Point| (0.5 / a.z + 0.5 / b.z - 1.0 / centre.z).abs() * centre.z;
+        if bend(&left, &right) > 0.015 || bend(&above, &below) > 0.015 {
+            return None;
+        }
+        let normal = unit(&(right - left).cross(&(below - above)))?;
+        Some(if normal.dot(&centre.coords) > 0.0 { -normal } else { normal })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sketch_of_a_slanted_wall_has_its_points_and_normal() {
+        let camera = Camera { width: 640, height: 480, fx: 400.0, fy: 400.0, cx: 319.5, cy: 239.5 };
+        let normal = Vector::new(0.3, -0.2, -1.0).normalize();
+        let mut depth = Grid::filled(640, 480, 0.0f32);
+        for y in 0..480 {
+            for x in 0..640 {
+                let ray = camera.unproject(x as f64, y as f64, 1.0).coords;
+                depth.data[y * 640 + x] = (-2.0 / normal.dot(&ray)) as f32;
+            }
+        }
+        let sketch = Sketch::of(0, &depth, None);
+        assert!(sketch.depth.data.len() <= MAX_SAMPLES);
+        let p = sketch.point(&camera, 10, 20).unwrap();
+        assert!((normal.dot(&p.coords) + 2.0).abs() < 1e-5);
+        let (u, v) = sketch.pixel(10, 20);
+        assert_eq!(sketch.sample(u, v), Some((10, 20)));
+        assert!((sketch.normal(&camera, 10, 20, 3).unwrap() - normal).norm() < 1e-4);
+        assert!(sketch.normal(&camera, 1, 20, 3).is_none());
+    }
+}
