@@ -3,15 +3,17 @@
 //! Masks cover whole pieces of furniture; depth before and after the interaction tells the moving part from the rest
 //! without knowing the joint.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use super::Face;
 use crate::articulation::{Action, Articulation};
 use crate::config;
-use crate::error::Result;
 use crate::hands::Trajectory;
 use crate::math::{Point, Pose};
-use crate::recording::{Camera, Clip, Grid, HAND_CLASS, Recording};
+use crate::recording::sketch::Sketch;
+use crate::recording::{Camera, Clip, Recording};
 
 /// A rectangle in face coordinates, metres: `[right, up][min, max]`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -43,42 +45,26 @@ pub struct CellVotes {
     gone: Vec<u16>,
 }
 
-/// A decoded view of the furniture, with the grip's position where the hand holds the part in it.
-#[derive(Debug, Clone)]
-pub struct View {
-    /// Frame index.
-    pub frame: usize,
+/// A view of the furniture, with the grip's position where the hand holds the part in it.
+#[derive(Debug, Clone, Copy)]
+pub struct View<'a> {
     camera_from_world: Pose,
     camera: Camera,
-    depth: Grid<f32>,
-    mask: Option<Grid<u8>>,
+    sketch: &'a Sketch,
+    /// What the sketch's depth is multiplied by.
+    factor: f64,
     /// Where the hand holds the part, world.
-    pub grip: Option<Point>,
+    pub grip: Point,
 }
 
-impl View {
-    /// Decodes a frame; `None` where it has no depth.
-    pub fn load(recording: &Recording, frame: usize, grip: Option<Point>) -> Result<Option<Self>> {
-        let Some(depth) = recording.depth(frame)? else { return Ok(None) };
-        Ok(Some(Self {
-            frame,
-            camera_from_world: recording.frames[frame].world_from_camera.inverse(),
-            camera: recording.camera,
-            depth,
-            mask: recording.mask(frame)?,
-            grip,
-        }))
-    }
-
+impl View<'_> {
     /// How far behind the world point `p` the seen surface lies (negative: in front of it), and the depth of `p`.
     /// `None` outside the image, under a hand or where there is no depth.
     fn gap(&self, p: &Point) -> Option<(f64, f64)> {
         let local = self.camera_from_world * p;
         let (u, v) = self.camera.project(&local).filter(|_| local.z > 0.15)?;
-        if self.mask.as_ref().and_then(|m| m.nearest(u, v)) == Some(HAND_CLASS) {
-            return None;
-        }
-        let z = f64::from(self.depth.nearest(u, v)?);
+        let (x, y) = self.sketch.sample(u, v)?;
+        let z = f64::from(self.sketch.depth.data[y * self.sketch.depth.width + x]) * self.factor;
         (z > 0.0).then_some((z - local.z, local.z))
     }
 }
@@ -114,13 +100,26 @@ pub fn open_frames(recording: &Recording, clip: &Clip, trajectory: &Trajectory) 
     frames
 }
 
-/// The frames of [`open_frames`] that have depth, decoded.
-pub fn open_views(recording: &Recording, clip: &Clip, trajectory: &Trajectory) -> Result<Vec<View>> {
-    let mut views = Vec::new();
-    for (frame, grip) in open_frames(recording, clip, trajectory) {
-        views.extend(View::load(recording, frame, Some(grip))?);
-    }
-    Ok(views)
+/// The frames of [`open_frames`] that have a sketch.
+#[must_use]
+pub fn open_views<'a>(
+    recording: &Recording,
+    sketches: &'a BTreeMap<usize, Sketch>,
+    clip: &Clip,
+    trajectory: &Trajectory,
+) -> Vec<View<'a>> {
+    open_frames(recording, clip, trajectory)
+        .into_iter()
+        .filter_map(|(frame, grip)| {
+            Some(View {
+                camera_from_world: recording.frames[frame].world_from_camera.inverse(),
+                camera: recording.camera,
+                sketch: sketches.get(&frame)?,
+                factor: recording.depth_factor(frame),
+                grip,
+            })
+        })
+        .collect()
 }
 
 /// How well a joint explains the open views: of the face's points that it moves clearly, the share that is seen where it
@@ -133,8 +132,7 @@ pub fn agreement(face: &Face, rect: Option<&Rect>, joint: &Articulation, grip: &
     let bounds = rect.map_or([[-HALF_M, HALF_M]; 2], |r| r.bounds);
     let (mut there, mut through) = (0usize, 0usize);
     for view in views {
-        let Some(held) = view.grip else { continue };
-        let motion = joint.motion(joint.opening_at(grip, &held));
+        let motion = joint.motion(joint.opening_at(grip, &view.grip));
         for i in 0..STEPS * STEPS {
             let at = |k: usize, b: [f64; 2]| b[0] + (b[1] - b[0]) * (k as f64 + 0.5) / STEPS as f64;
             let here = face.point(at(i % STEPS, bounds[0]), at(i / STEPS, bounds[1]), 0.0);
@@ -201,8 +199,8 @@ pub fn vote(
                 // Seen through by clearly more than a door's thickness.
                 votes.gone[i] += u16::from(gap > tolerance(z) + 0.04);
             }
-            let (Some((joint, grip)), Some(held)) = (joint, view.grip) else { continue };
-            let moved = joint.motion(joint.opening_at(grip, &held)) * here;
+            let Some((joint, grip)) = joint else { continue };
+            let moved = joint.motion(joint.opening_at(grip, &view.grip)) * here;
             // Only where the part has moved clear of its own noise.
             if let Some((gap, z)) = view.gap(&moved)
                 && (moved - here).norm() > 2.0 * tolerance(z)

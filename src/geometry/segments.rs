@@ -73,48 +73,55 @@ pub struct LiftedSegment {
     pub samples: Vec<Point>,
 }
 
-/// What one view tells about the static scene.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct ViewGeometry {
-    /// Line segments in the world.
-    pub segments: Vec<LiftedSegment>,
+impl LiftedSegment {
+    /// The same with its view's depth multiplied by a factor.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        let moved = |p: &Point| self.eye + (p - self.eye) * factor;
+        let line = Line { point: moved(&self.segment.line.point), ..self.segment.line };
+        Self {
+            segment: Segment { line, span: self.segment.span.map(|s| s * factor) },
+            samples: self.samples.iter().map(moved).collect(),
+            ..self.clone()
+        }
+    }
 }
 
-/// Segments of one frame: its own detector's where the recording has them, else what `detector` finds in the image.
-/// Nothing where the frame has neither, or no depth.
-pub fn lift_view(
+/// Segments of one frame, lifted with its depth as read: its own detector's where the recording has them, else what
+/// `detector` finds in the image; none where the frame has neither.
+pub fn lift(
     recording: &Recording,
     frame: usize,
+    depth: &Grid<f32>,
+    mask: Option<&Grid<u8>>,
     detector: &dyn LineDetector,
     config: &config::Geometry,
     seed: u64,
-) -> Result<ViewGeometry> {
+) -> Result<Vec<LiftedSegment>> {
     let found = match recording.segments(frame)? {
         Some(ends) => ends.into_iter().map(|[a, b]| Segment2 { a, b }).collect(),
         None => match recording.grey(frame)? {
             Some(grey) => detector.detect(&grey, config.min_segment_px),
-            None => return Ok(ViewGeometry::default()),
+            None => return Ok(Vec::new()),
         },
     };
-    let Some(depth) = recording.depth(frame)? else { return Ok(ViewGeometry::default()) };
-    let mask = recording.mask(frame)?;
     let pose = &recording.frames[frame].world_from_camera;
     let eye = recording.frames[frame].center();
     let ray = |p: [f64; 2]| pose.rotation * recording.camera.unproject(p[0], p[1], 1.0).coords;
-    let segments = found
+    let lifted = found
         .into_iter()
-        .filter(|image| image.length() >= config.min_segment_px && !on_hand(image, mask.as_ref()))
+        .filter(|image| image.length() >= config.min_segment_px && !on_hand(image, mask))
         .filter_map(|image| {
             let plane = unit(&ray(image.a).cross(&ray(image.b)))?;
             let (segment, samples) = match config.lines {
                 LineMethod::Unprojected => {
-                    let samples = unproject(recording, frame, &image, &depth, config.samples_per_segment);
+                    let samples = unproject(recording, frame, &image, depth, config.samples_per_segment);
                     let segment = fit_segment(&samples, config, seed ^ frame as u64)?;
                     let near = |p: &Point| segment.line.distance(p) <= config.line_tolerance_m;
                     (segment, samples.into_iter().filter(near).collect())
                 }
                 LineMethod::Triangulated => {
-                    let [start, end] = inverse_depth(&image, &depth, config.samples_per_segment)?;
+                    let [start, end] = inverse_depth(&image, depth, config.samples_per_segment)?;
                     let at = |p: [f64; 2], w: f64| eye + ray(p) / w;
                     (Segment::between(&at(image.a, start), &at(image.b, end))?, Vec::new())
                 }
@@ -122,7 +129,7 @@ pub fn lift_view(
             Some(LiftedSegment { view: frame, image, segment, eye, plane, samples })
         })
         .collect();
-    Ok(ViewGeometry { segments })
+    Ok(lifted)
 }
 
 /// Whether more than a fifth of a segment runs along or over a hand.

@@ -7,12 +7,14 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use nalgebra::{Matrix2, Matrix3, SymmetricEigen};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::segments::{LiftedSegment, fit_segment};
 use crate::config;
 use crate::localization::{Region, voxels};
 use crate::math::line::{Line, Segment};
+use crate::math::ransac::{Search, lo_ransac};
 use crate::math::{Point, Vector, any_orthogonal, reject, unit, unsigned_angle};
 use crate::recording::Recording;
 
@@ -39,23 +41,60 @@ impl LineTrack {
     }
 }
 
-/// Lines that lie at the region: two of their quarter points within a voxel of a confident one. Best supported first.
+/// Lines that run along the region, cut to the stretch that does. Best supported first.
 #[must_use]
 pub fn at_region(tracks: &[LineTrack], region: &Region) -> Vec<LineTrack> {
-    let inside: HashSet<[i32; 3]> = region.voxels.iter().copied().collect();
-    tracks.iter().filter(|t| touches(&t.segment, &inside, region.voxel_m)).cloned().collect()
+    let near = Nearness::new(region);
+    let mut out: Vec<LineTrack> = tracks
+        .iter()
+        .filter_map(|t| {
+            let span = near.stretch(&t.segment)?;
+            let middle = 0.5 * (span[0] + span[1]);
+            // The covariance of the direction moves with the middle only where it stays near it; a rod's ends are less sure.
+            let lever = middle - 0.5 * (t.segment.span[0] + t.segment.span[1]);
+            Some(LineTrack {
+                segment: Segment { span, ..t.segment },
+                position_covariance: t.position_covariance + t.direction_covariance * (lever * lever),
+                ..t.clone()
+            })
+        })
+        .collect();
+    best_first(&mut out);
+    out
 }
 
-fn touches(segment: &Segment, inside: &HashSet<[i32; 3]>, voxel_m: f64) -> bool {
-    let hits = [0.0, 0.25, 0.5, 0.75, 1.0]
-        .iter()
-        .filter(|t| {
-            let p = segment.line.point + segment.line.direction * (segment.span[0] + **t * segment.length());
-            let [x, y, z] = voxels::index(&p, voxel_m);
-            (-1..=1).any(|dx| (-1..=1).any(|dy| (-1..=1).any(|dz| inside.contains(&[x + dx, y + dy, z + dz]))))
-        })
-        .count();
-    hits >= 2
+/// The surroundings of a region: its confident voxels and their neighbours.
+struct Nearness {
+    voxels: HashSet<[i32; 3]>,
+    voxel_m: f64,
+}
+
+impl Nearness {
+    fn new(region: &Region) -> Self {
+        let mut voxels = HashSet::new();
+        for [x, y, z] in &region.voxels {
+            for i in 0..27 {
+                voxels.insert([x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1]);
+            }
+        }
+        Self { voxels, voxel_m: region.voxel_m }
+    }
+
+    /// The stretch of a segment that runs along the region; `None` where that is under three voxels, or under two fifths of
+    /// a segment shorter than that.
+    fn stretch(&self, segment: &Segment) -> Option<[f64; 2]> {
+        let count = (2.0 * segment.length() / self.voxel_m).ceil().max(4.0) as usize;
+        let at = |i: usize| segment.span[0] + segment.length() * i as f64 / count as f64;
+        let inside = |i: &usize| {
+            let p = segment.line.point + segment.line.direction * at(*i);
+            self.voxels.contains(&voxels::index(&p, self.voxel_m))
+        };
+        let hits = (0..=count).filter(inside).count();
+        let first = (0..=count).find(inside)?;
+        let last = (0..=count).rev().find(inside)?;
+        let along = hits as f64 / (count + 1) as f64 * segment.length();
+        (along >= (3.0 * self.voxel_m).min(0.4 * segment.length()) && last > first).then(|| [at(first), at(last)])
+    }
 }
 
 /// The paper's lines: lifted segments of a clip's views at its region, grouped and fitted with LO-RANSAC.
@@ -66,9 +105,9 @@ pub fn unprojected(
     config: &config::Geometry,
     seed: u64,
 ) -> Vec<LineTrack> {
-    let inside: HashSet<[i32; 3]> = region.voxels.iter().copied().collect();
+    let around = Nearness::new(region);
     let near: Vec<&LiftedSegment> =
-        lifted.iter().copied().filter(|s| touches(&s.segment, &inside, region.voxel_m)).collect();
+        lifted.iter().copied().filter(|s| around.stretch(&s.segment).is_some()).collect();
     let mut tracks: Vec<LineTrack> = groups(&near, config)
         .into_iter()
         .enumerate()
@@ -99,14 +138,19 @@ pub fn unprojected(
 
 /// Lines of the whole scene from the segments of all views.
 #[must_use]
-pub fn triangulated(recording: &Recording, lifted: &[&LiftedSegment], config: &config::Geometry) -> Vec<LineTrack> {
+pub fn triangulated(
+    recording: &Recording,
+    lifted: &[&LiftedSegment],
+    config: &config::Geometry,
+    seed: u64,
+) -> Vec<LineTrack> {
     let mut tracks: Vec<LineTrack> = Vec::new();
     let mut left: Vec<&LiftedSegment> = lifted.to_vec();
     // Depth groups coarsely: of two edges a few centimetres apart the better seen one wins a group, and what it leaves
     // makes a group of its own in the next round.
     for _ in 0..3 {
         let fresh: Vec<LineTrack> =
-            groups(&left, config).iter().filter_map(|members| triangulate(recording, members, config)).collect();
+            groups(&left, config).par_iter().filter_map(|m| triangulate(recording, m, config, seed)).collect();
         if fresh.is_empty() {
             break;
         }
@@ -114,7 +158,7 @@ pub fn triangulated(recording: &Recording, lifted: &[&LiftedSegment], config: &c
         tracks = merged(tracks);
         let (assigned, rest) = assign(recording, &left, &tracks);
         let settled: Vec<LineTrack> =
-            assigned.iter().filter_map(|members| triangulate(recording, members, config)).collect();
+            assigned.par_iter().filter_map(|m| triangulate(recording, m, config, seed)).collect();
         // A track that lost its members to a neighbour keeps what earlier rounds gave it.
         tracks = merged(tracks.into_iter().chain(settled).collect());
         left = rest;
@@ -219,103 +263,132 @@ const POSE_STD_M: f64 = 0.004;
 /// Standard deviation of depth along the ray, as a share of the distance, once its scale is corrected.
 const DEPTH_STD: f64 = 0.03;
 
-/// The line that the viewing planes of a group have in common; depth says little more than where along them it lies.
-fn triangulate(recording: &Recording, members: &[&LiftedSegment], config: &config::Geometry) -> Option<LineTrack> {
+/// What one view says about a line.
+struct Sight {
+    plane: Vector,
+    eye: Point,
+    middle: Point,
+    along: Vector,
+    /// Standard deviations: of the plane at the line (m), of the line's direction out of the plane, of depth (m), of the
+    /// direction within the plane as depth has it.
+    std: [f64; 4],
+}
+
+impl Sight {
+    fn new(recording: &Recording, member: &LiftedSegment) -> Self {
+        let middle = member.segment.middle();
+        let range = (middle - member.eye).norm();
+        let across = (range * DETECTION_STD_PX / recording.camera.fx).hypot(POSE_STD_M);
+        let length = member.segment.length().max(0.03);
+        let depth = DEPTH_STD * range;
+        Self {
+            plane: member.plane,
+            eye: member.eye,
+            middle,
+            along: member.segment.line.direction,
+            // Both ends are off independently: the direction by sqrt(12)/2 of it over the length.
+            std: [across, 1.7 * across / length, depth, 1.7 * depth / length],
+        }
+    }
+
+    /// Distance of a line from what was seen, in standard deviations.
+    fn misfit(&self, line: &Line) -> f64 {
+        let across = self.plane.dot(&(line.point - self.eye)) / self.std[0];
+        let turn = self.plane.dot(&line.direction) / self.std[1];
+        let depth = line.distance(&self.middle) / self.std[2];
+        (across * across + turn * turn + 0.25 * depth * depth).sqrt()
+    }
+}
+
+/// Least squares over some sights: the line and its information matrices (position, direction).
+fn common_line(sights: &[Sight], ids: &[usize]) -> Option<(Line, [Matrix3<f64>; 2])> {
+    let first = ids.iter().map(|&i| &sights[i]).min_by(|a, b| a.std[1].total_cmp(&b.std[1]))?;
+    let mut position = Matrix3::zeros();
+    let mut turning = Matrix3::zeros();
+    let mut pull = Vector::zeros();
+    let mut middle = Vector::zeros();
+    for sight in ids.iter().map(|&i| &sights[i]) {
+        let [across, turn, depth, depth_turn] = sight.std;
+        let plane = sight.plane * sight.plane.transpose();
+        let by_plane = plane / (across * across);
+        // Depth places the line along the ray; along the line itself it says nothing.
+        let ray = unit(&reject(&(sight.middle - sight.eye), &sight.along))?;
+        let by_depth = ray * ray.transpose() / (depth * depth);
+        position += by_plane + by_depth;
+        pull += by_plane * sight.eye.coords + by_depth * sight.middle.coords;
+        middle += sight.middle.coords / ids.len() as f64;
+        // In the viewing plane, depth alone tells the direction.
+        let in_plane = unit(&sight.plane.cross(&sight.along))?;
+        turning += plane / (turn * turn) + in_plane * in_plane.transpose() / (depth_turn * depth_turn);
+    }
+    let eigen = SymmetricEigen::new(turning);
+    let found = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+    let direction = if found.dot(&first.along) < 0.0 { -found } else { found };
+    // Along the line the place is free: the middle of the sights.
+    let free = direction * direction.transpose() * (1e-6 * position.trace());
+    let point = Point::from((position + free).try_inverse()? * (pull + free * middle));
+    Some((Line { point, direction }, [position, turning]))
+}
+
+/// The line that the viewing planes of a group have in common (LO-RANSAC over pairs of views); depth says little more than
+/// where along the rays it lies.
+fn triangulate(
+    recording: &Recording,
+    members: &[&LiftedSegment],
+    config: &config::Geometry,
+    seed: u64,
+) -> Option<LineTrack> {
+    /// A sight within this many standard deviations belongs to the line.
+    const TOLERANCE: f64 = 3.0;
+    /// Two planes that differ by less have no usable line in common (2 degrees).
+    const LEAST_SINE: f64 = 0.035;
     if views_of(members).len() < config.min_track_views {
         return None;
     }
-    let focal = recording.camera.fx;
-    let first = members.iter().max_by(|a, b| a.segment.length().total_cmp(&b.segment.length()))?;
-    let mut direction = first.segment.line.direction;
-    let mut point = {
-        let sum = members.iter().fold(Vector::zeros(), |s, m| s + m.segment.middle().coords);
-        Point::from(sum / members.len() as f64)
+    let sights: Vec<Sight> = members.iter().map(|m| Sight::new(recording, m)).collect();
+    let pair = |ids: &[usize; 2]| -> Option<Line> {
+        let [a, b] = ids.map(|i| &sights[i]);
+        if a.plane.cross(&b.plane).norm() < LEAST_SINE {
+            // Seen from one direction only: depth has to help.
+            return common_line(&sights, ids).map(|(line, _)| line);
+        }
+        let direction = a.plane.cross(&b.plane).normalize();
+        let middle = Point::from(0.5 * (a.middle.coords + b.middle.coords));
+        let system = Matrix3::from_rows(&[a.plane.transpose(), b.plane.transpose(), direction.transpose()]);
+        let rhs = Vector::new(a.plane.dot(&a.eye.coords), b.plane.dot(&b.eye.coords), direction.dot(&middle.coords));
+        Some(Line { point: Point::from(system.try_inverse()? * rhs), direction })
     };
-    /// One view's say.
-    struct View {
-        plane: Vector,
-        eye: Point,
-        middle: Point,
-        along: Vector,
-        /// Standard deviations: of the plane at the line, of the line's direction out of the plane, of depth, of the
-        /// direction as depth has it.
-        std: [f64; 4],
-        weight: f64,
-    }
-    let mut views: Vec<View> = members
-        .iter()
-        .map(|m| {
-            let middle = m.segment.middle();
-            let range = (middle - m.eye).norm();
-            let across = (range * DETECTION_STD_PX / focal).hypot(POSE_STD_M);
-            let length = m.segment.length().max(0.03);
-            let depth = DEPTH_STD * range;
-            View {
-                plane: m.plane,
-                eye: m.eye,
-                middle,
-                along: m.segment.line.direction,
-                // Both ends are off independently: the direction by sqrt(12)/2 of it over the length.
-                std: [across, 1.7 * across / length, depth, 1.7 * depth / length],
-                weight: 1.0,
-            }
-        })
-        .collect();
-    let mut position_information = Matrix3::zeros();
-    let mut direction_information = Matrix3::zeros();
-    for _ in 0..8 {
-        position_information = Matrix3::zeros();
-        direction_information = Matrix3::zeros();
-        let mut pull = Vector::zeros();
-        for v in &views {
-            let [across, turn, depth, depth_turn] = v.std;
-            let plane = v.plane * v.plane.transpose();
-            let by_plane = plane * (v.weight / (across * across));
-            // Depth places the line along the ray; along the line itself it says nothing.
-            let ray = unit(&reject(&(v.middle - v.eye), &direction)).unwrap_or_else(|| any_orthogonal(&direction));
-            let by_depth = ray * ray.transpose() * (v.weight / (depth * depth));
-            position_information += by_plane + by_depth;
-            pull += by_plane * v.eye.coords + by_depth * v.middle.coords;
-            // In the viewing plane, depth alone tells the direction.
-            let in_plane = unit(&v.plane.cross(&v.along)).unwrap_or(v.plane);
-            direction_information += plane * (v.weight / (turn * turn))
-                + in_plane * in_plane.transpose() * (v.weight / (depth_turn * depth_turn));
-        }
-        // Along the line the place is free: keep it.
-        let free = direction * direction.transpose() * (1e-6 * position_information.trace());
-        point = Point::from((position_information + free).try_inverse()? * (pull + free * point.coords));
-        let eigen = SymmetricEigen::new(direction_information);
-        let found = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
-        direction = if found.dot(&direction) < 0.0 { -found } else { found };
-        for v in &mut views {
-            let r = v.plane.dot(&(point - v.eye)) / v.std[0];
-            let turn = v.plane.dot(&direction) / v.std[1];
-            v.weight = 1.0 / (1.0 + (r / 2.5).powi(2) + (turn / 3.0).powi(2)).powi(2);
-        }
-    }
-    let line = Line { point, direction };
-    let kept: Vec<(&LiftedSegment, &View)> =
-        members.iter().copied().zip(&views).filter(|(_, v)| v.weight > 0.2).collect();
-    let seen = views_of(&kept.iter().map(|(m, _)| *m).collect::<Vec<_>>());
-    if seen.len() < config.min_track_views {
+    // As many draws as there are pairs are enough for a small group.
+    let draws = config.line_draws.min(sights.len() * (sights.len() - 1));
+    let found = lo_ransac::<Line, 2>(
+        sights.len(),
+        Search { draws, tolerance: TOLERANCE, seed },
+        pair,
+        |ids| common_line(&sights, ids).map(|(line, _)| line),
+        |line, i| sights[i].misfit(line),
+    )?;
+    let kept: Vec<&LiftedSegment> = found.inliers.iter().map(|&i| members[i]).collect();
+    let views = views_of(&kept);
+    if views.len() < config.min_track_views {
         return None;
     }
-    let total: f64 = kept.iter().map(|(_, v)| v.weight).sum();
-    let variance =
-        kept.iter().map(|(_, v)| v.weight * v.plane.dot(&(point - v.eye)).powi(2)).sum::<f64>() / total.max(1e-9);
-    let expected = kept.iter().map(|(_, v)| v.weight * v.std[0].powi(2)).sum::<f64>() / total.max(1e-9);
+    let (line, [position, turning]) = common_line(&sights, &found.inliers)?;
+    let of = |f: &dyn Fn(&Sight) -> f64| {
+        found.inliers.iter().map(|&i| f(&sights[i])).sum::<f64>() / found.inliers.len().max(1) as f64
+    };
+    let variance = of(&|s| s.plane.dot(&(line.point - s.eye)).powi(2));
     // Where the views disagree by more than assumed, poses are worse than assumed.
-    let inflation = (variance / expected.max(1e-12)).max(1.0);
-    let spans: Vec<[f64; 2]> = kept.iter().filter_map(|(m, _)| span_on(&line, m)).collect();
+    let inflation = (variance / of(&|s| s.std[0].powi(2)).max(1e-12)).max(1.0);
+    let spans: Vec<[f64; 2]> = kept.iter().filter_map(|m| span_on(&line, m)).collect();
     let span = common_span(&spans)?;
     let segment = Segment { line, span };
-    let moved = Segment { line: Line { point: segment.middle(), direction }, span: [-0.5, 0.5].map(|s| s * segment.length()) };
+    let half = 0.5 * segment.length();
     Some(LineTrack {
-        segment: moved,
-        views: seen,
+        segment: Segment { line: Line { point: segment.middle(), ..line }, span: [-half, half] },
+        views,
         rms_m: variance.sqrt(),
-        position_covariance: across_covariance(&position_information, &direction) * inflation,
-        direction_covariance: across_covariance(&direction_information, &direction) * inflation,
+        position_covariance: across_covariance(&position, &line.direction) * inflation,
+        direction_covariance: across_covariance(&turning, &line.direction) * inflation,
     })
 }
 
@@ -525,7 +598,7 @@ mod tests {
         let ends = [Point::new(0.1, 0.0, -0.3), Point::new(0.1, 0.02, 0.4)];
         let lifted = lift(&recording, ends, |v| if v % 2 == 0 { 0.02 } else { -0.015 });
         let tracks =
-            triangulated(&recording, &lifted.iter().collect::<Vec<_>>(), &config::Geometry::default());
+            triangulated(&recording, &lifted.iter().collect::<Vec<_>>(), &config::Geometry::default(), 0);
         assert_eq!(tracks.len(), 1, "{tracks:#?}");
         let track = &tracks[0];
         assert_eq!(track.views.len(), 8);
@@ -543,7 +616,7 @@ mod tests {
         let mut lifted = lift(&recording, edge(0.0), |v| 0.01 * (v % 3) as f64);
         lifted.extend(lift(&recording, edge(0.035), |v| -0.01 * (v % 2) as f64));
         let tracks =
-            triangulated(&recording, &lifted.iter().collect::<Vec<_>>(), &config::Geometry::default());
+            triangulated(&recording, &lifted.iter().collect::<Vec<_>>(), &config::Geometry::default(), 0);
         let mut heights: Vec<f64> = tracks.iter().map(|t| t.segment.middle().z).collect();
         heights.sort_by(f64::total_cmp);
         assert_eq!(heights.len(), 2, "{heights:?}");

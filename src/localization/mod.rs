@@ -23,7 +23,7 @@ pub struct Region {
     pub voxels: Vec<[i32; 3]>,
     /// Distinct views that a voxel needed in the end (the configured number, or fewer where nothing reached it).
     pub min_views: usize,
-    /// Points of the local frames inside the confident voxels, world, metres.
+    /// Points inside the confident voxels, world, metres; at most [`MAX_POINTS`].
     #[serde(skip)]
     pub points: Vec<Point>,
     /// Mask class of the touched furniture, where masks tell.
@@ -43,6 +43,9 @@ impl Region {
         self.voxels.iter().map(|v| voxels::center(v, self.voxel_m)).collect()
     }
 }
+
+/// Surface points kept of a region: about ten on every square centimetre of a door.
+const MAX_POINTS: usize = 60_000;
 
 /// Finds the confident region of one clip. `sketches` holds the frames of [`local_frames`].
 #[must_use]
@@ -68,20 +71,29 @@ pub fn localize(
     if seen.is_empty() {
         return Outcome::Abstained("no depth within reach of the hand in the local frames".to_owned());
     }
+    // A person at a door sees half of it: frames of the whole recording in which nobody is at work show the rest.
+    if config.closed_state_frames {
+        for (view, sketch) in others(recording, clip, &frames, sketches, &grip).into_iter().enumerate() {
+            let near = |p: &Point| (p - grip).norm() <= config.reach_m;
+            let view = (images.len() + view) as u32;
+            seen.extend(points(recording, sketch, class).into_iter().filter(near).map(|p| (view, p)));
+        }
+    }
     let counts = voxels::count_views(&seen, config.voxel_m);
     // Fewer views than asked for where nothing reaches them: a coarse region is better than none, and it says so.
-    for min_views in (1..=config.min_views.min(images.len())).rev() {
+    for min_views in (1..=config.min_views).rev() {
         let confident: Vec<[i32; 3]> =
             counts.iter().filter(|(_, n)| **n as usize >= min_views).map(|(v, _)| *v).collect();
         let connected = voxels::connected_with(&confident, &grip, config.voxel_m);
         // A face of 30 x 30 cm fills 36 voxels of 5 cm; a third of that is no furniture.
         if connected.len() >= 12 {
             let inside: std::collections::HashSet<[i32; 3]> = connected.iter().copied().collect();
-            let points = seen
+            let points: Vec<Point> = seen
                 .iter()
                 .filter(|(_, p)| inside.contains(&voxels::index(p, config.voxel_m)))
                 .map(|(_, p)| *p)
                 .collect();
+            let points = points.iter().copied().step_by(points.len().div_ceil(MAX_POINTS)).collect();
             return Outcome::Found(Region {
                 voxel_m: config.voxel_m,
                 voxels: connected,
@@ -95,6 +107,26 @@ pub fn localize(
         }
     }
     Outcome::Abstained("no confident voxels near the hand".to_owned())
+}
+
+/// Frames of the whole recording that see the grip while nobody is at work, other than the local ones: at most forty, spread
+/// over the recording.
+fn others<'a>(
+    recording: &Recording,
+    clip: &Clip,
+    local: &[usize],
+    sketches: &'a BTreeMap<usize, Sketch>,
+    grip: &Point,
+) -> Vec<&'a Sketch> {
+    const COUNT: usize = 40;
+    let at_work = |f: usize| {
+        (clip.start_frame..=clip.end_frame).contains(&f) || views::interacting(recording, f)
+    };
+    let all: Vec<&Sketch> = sketches
+        .values()
+        .filter(|s| !local.contains(&s.frame) && !at_work(s.frame) && sees(recording, s.frame, grip))
+        .collect();
+    (0..all.len().min(COUNT)).map(|i| all[i * all.len() / all.len().min(COUNT)]).collect()
 }
 
 /// World points of a frame's depth, hands and (where there are masks) other classes left out.

@@ -39,7 +39,8 @@ pub fn survey(recording: &Recording, count: usize) -> Vec<usize> {
 }
 
 /// Whether a narrated interaction is going on.
-fn interacting(recording: &Recording, frame: usize) -> bool {
+#[must_use]
+pub fn interacting(recording: &Recording, frame: usize) -> bool {
     recording.clips.iter().any(|c| c.end_frame > c.start_frame && (c.start_frame..=c.end_frame).contains(&frame))
 }
 

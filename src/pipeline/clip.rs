@@ -2,12 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use super::ClipResult;
+use super::{ClipResult, Looks};
 use crate::articulation::Outcome;
 use crate::config::{Config, LineMethod};
-use crate::error::Result;
 use crate::geometry::moved::{self, Rect};
-use crate::geometry::segments::{LiftedSegment, ViewGeometry};
+use crate::geometry::segments::LiftedSegment;
 use crate::geometry::{Face, LineTrack, ManhattanFrame, candidates, face, tracks};
 use crate::hands::{self, Trajectory};
 use crate::inference;
@@ -23,8 +22,10 @@ pub(super) struct Followed {
     reading: Reading,
     /// The hand, or the reason why there is none.
     hand: Outcome<Trajectory>,
-    /// Frames whose depth the next steps need.
-    pub(super) frames: Vec<usize>,
+    /// Frames in which the furniture is closed.
+    pub(super) closed: Vec<usize>,
+    /// Frames in which it is open.
+    pub(super) open: Vec<usize>,
 }
 
 pub(super) fn follow(recording: &Recording, clip: &Clip, config: &Config) -> Followed {
@@ -34,12 +35,11 @@ pub(super) fn follow(recording: &Recording, clip: &Clip, config: &Config) -> Fol
     } else {
         hands::trajectory(recording, clip, &reading, &config.hands)
     };
-    let frames = hand.found().map_or_else(Vec::new, |t| {
-        let mut frames = localization::local_frames(recording, clip, t, &config.localization);
-        frames.extend(moved::open_frames(recording, clip, t).into_iter().map(|(f, _)| f));
-        frames
+    let (closed, open) = hand.found().map_or_else(Default::default, |t| {
+        let open = moved::open_frames(recording, clip, t).into_iter().map(|(frame, _)| frame).collect();
+        (localization::local_frames(recording, clip, t, &config.localization), open)
     });
-    Followed { reading, hand, frames }
+    Followed { reading, hand, closed, open }
 }
 
 /// A clip after hands and localisation.
@@ -81,8 +81,7 @@ pub(super) fn locate(
 /// What the whole scene's views show.
 #[derive(Clone, Copy)]
 pub(super) struct Seen<'a> {
-    pub(super) sketches: &'a BTreeMap<usize, Sketch>,
-    pub(super) lifted: &'a BTreeMap<usize, ViewGeometry>,
+    pub(super) looks: &'a Looks,
     /// Triangulated lines.
     pub(super) lines: &'a [LineTrack],
     pub(super) room: Option<&'a ManhattanFrame>,
@@ -96,7 +95,7 @@ pub(super) fn infer(
     seen: &Seen,
     reasoner: &dyn Reasoner,
     config: &Config,
-) -> Result<ClipResult> {
+) -> ClipResult {
     let mut result = ClipResult {
         clip: clip.clone(),
         trajectory: located.trajectory,
@@ -109,17 +108,17 @@ pub(super) fn infer(
         answer: None,
         joint: Outcome::Abstained(located.reason.unwrap_or_default()),
     };
-    let (Some(trajectory), Some(region)) = (&result.trajectory, &result.region) else { return Ok(result) };
+    let (Some(trajectory), Some(region)) = (&result.trajectory, &result.region) else { return result };
 
     result.lines = match config.geometry.lines {
         LineMethod::Triangulated => tracks::at_region(seen.lines, region),
         LineMethod::Unprojected => {
             let in_views: Vec<&LiftedSegment> =
-                result.views.iter().filter_map(|v| seen.lifted.get(v)).flat_map(|g| &g.segments).collect();
+                result.views.iter().filter_map(|v| seen.looks.segments.get(v)).flatten().collect();
             tracks::unprojected(&in_views, region, &config.geometry, config.seed)
         }
     };
-    let surface = surface(recording, region, &result.views, seen.sketches, config.localization.reach_m);
+    let surface = surface(recording, region, &result.views, &seen.looks.sketches, config.localization.reach_m);
     let around = face::Surroundings {
         surface: &surface,
         grips: [region.grip, trajectory.open_grip()],
@@ -130,7 +129,7 @@ pub(super) fn infer(
     result.face = face::fit(&around, &config.geometry, config.seed);
 
     let path = trajectory.positions();
-    let open = moved::open_views(recording, clip, trajectory)?;
+    let open = moved::open_views(recording, &seen.looks.sketches, clip, trajectory);
     let stops = result.face.as_ref().map_or_else(Vec::new, |f| edges_on(f, &result.lines));
     if let Some(face) = &result.face {
         result.part = moved::vote(face, &surface, &open, None, &config.fitting).moving_rect(&stops);
@@ -180,7 +179,7 @@ pub(super) fn infer(
         result.part = votes.moving_rect(&stops).or(result.part);
     }
     result.answer = Some(answer);
-    Ok(result)
+    result
 }
 
 /// Up, as the room's own upright edges have it where they are near the world's (which may be off by a degree).

@@ -12,7 +12,7 @@ use crate::articulation::{Articulation, Outcome};
 use crate::config::{Config, LineMethod};
 use crate::error::{Error, Result};
 use crate::geometry::moved::Rect;
-use crate::geometry::segments::{LiftedSegment, LineDetector, ViewGeometry, lift_view};
+use crate::geometry::segments::{LiftedSegment, LineDetector, lift};
 use crate::geometry::{AxisCandidate, Face, LineTrack, ManhattanFrame, depth_scale, manhattan, tracks};
 use crate::hands::Trajectory;
 use crate::inference::ClipJoint;
@@ -114,34 +114,39 @@ pub fn infer(
     // Hands, clip by clip; they tell which frames are needed.
     let followed: Vec<clip::Followed> =
         recording.clips.par_iter().map(|clip| clip::follow(recording, clip, config)).collect();
-    let mut sketches: BTreeMap<usize, Sketch> = BTreeMap::new();
-    let sketch = |sketches: &mut BTreeMap<usize, Sketch>, frames: Vec<usize>| -> Result<()> {
-        let fresh: Vec<usize> = frames.into_iter().filter(|f| !sketches.contains_key(f)).collect();
-        start("reading depth", fresh.len());
-        let loaded: Vec<Option<Sketch>> = fresh
+
+    let mut looks = Looks::default();
+    let look = |looks: &mut Looks, frames: Vec<usize>, lines: bool| -> Result<()> {
+        let mut fresh: Vec<usize> = frames.into_iter().filter(|f| !looks.sketches.contains_key(f)).collect();
+        sort_unique(&mut fresh);
+        start("looking", fresh.len());
+        let seen: Vec<Option<(Sketch, Vec<LiftedSegment>)>> = fresh
             .par_iter()
             .map(|&frame| {
-                let sketch = Sketch::load(recording, frame);
-                tick("reading depth", fresh.len());
-                sketch
+                let seen = look_at(recording, frame, lines.then_some(detector), config);
+                tick("looking", fresh.len());
+                seen
             })
             .collect::<Result<_>>()?;
-        sketches.extend(loaded.into_iter().flatten().map(|s| (s.frame, s)));
+        for (sketch, segments) in seen.into_iter().flatten() {
+            looks.segments.insert(sketch.frame, segments);
+            looks.sketches.insert(sketch.frame, sketch);
+        }
         Ok(())
     };
-    let mut first: Vec<usize> = followed.iter().flat_map(|f| f.frames.iter().copied()).collect();
-    if config.geometry.depth_scale {
-        first.extend(views::survey(recording, config.localization.survey_frames));
-    }
-    sort_unique(&mut first);
-    sketch(&mut sketches, first)?;
-    let rectified = |sketches: &BTreeMap<usize, Sketch>| {
-        let depth_factors =
-            if config.geometry.depth_scale { depth_scale::solve(recording, sketches) } else { DepthFactors::default() };
-        Recording { depth_factors, ..recording.clone() }
+    let metric = |looks: &Looks| Recording {
+        depth_factors: match config.geometry.depth_scale {
+            true => depth_scale::solve(recording, &looks.sketches),
+            false => DepthFactors::default(),
+        },
+        ..recording.clone()
     };
-    let metric = rectified(&sketches);
 
+    let mut still: Vec<usize> = followed.iter().flat_map(|f| f.closed.iter().copied()).collect();
+    still.extend(views::survey(recording, config.localization.survey_frames));
+    look(&mut looks, still, true)?;
+    look(&mut looks, followed.iter().flat_map(|f| f.open.iter().copied()).collect(), false)?;
+    let rectified = metric(&looks);
     let total = recording.clips.len();
     start("localising", total);
     let located: Vec<clip::Located> = recording
@@ -149,51 +154,70 @@ pub fn infer(
         .par_iter()
         .zip(followed)
         .map(|(clip, followed)| {
-            let located = clip::locate(&metric, clip, followed, &sketches, config);
+            let located = clip::locate(&rectified, clip, followed, &looks.sketches, config);
             tick("localising", total);
             located
         })
         .collect();
 
-    // Every global view is decoded once, however many clips look through it.
     let mut wanted: Vec<usize> = located.iter().flat_map(|l| l.views.iter().copied()).collect();
     sort_unique(&mut wanted);
-    sketch(&mut sketches, wanted.clone())?;
-    let metric = rectified(&sketches);
-    start("finding lines", wanted.len());
-    let lifted: BTreeMap<usize, ViewGeometry> = wanted
-        .par_iter()
-        .map(|&view| {
-            let geometry = lift_view(&metric, view, detector, &config.geometry, config.seed)?;
-            tick("finding lines", wanted.len());
-            Ok((view, geometry))
-        })
-        .collect::<Result<_>>()?;
-    let room = manhattan::estimate(&metric, &with_normals_first(recording, &wanted), &config.geometry)?;
-
+    look(&mut looks, wanted.clone(), true)?;
+    let rectified = metric(&looks);
+    start("finding lines", 1);
+    for (frame, segments) in &mut looks.segments {
+        let factor = rectified.depth_factor(*frame);
+        segments.iter_mut().for_each(|s| *s = s.scaled(factor));
+    }
     let lines = match config.geometry.lines {
         LineMethod::Triangulated => {
-            let segments: Vec<&LiftedSegment> = lifted.values().flat_map(|g| &g.segments).collect();
-            tracks::triangulated(&metric, &segments, &config.geometry)
+            let segments: Vec<&LiftedSegment> = looks.segments.values().flatten().collect();
+            tracks::triangulated(&rectified, &segments, &config.geometry, config.seed)
         }
         LineMethod::Unprojected => Vec::new(),
     };
+    let room = manhattan::estimate(&rectified, &with_normals_first(recording, &wanted), &config.geometry)?;
 
     start("inferring", total);
-    let seen = clip::Seen { sketches: &sketches, lifted: &lifted, lines: &lines, room: room.as_ref() };
+    let seen = clip::Seen { looks: &looks, lines: &lines, room: room.as_ref() };
     let clips: Vec<ClipResult> = recording
         .clips
         .par_iter()
         .zip(located)
         .map(|(clip, located)| {
-            let result = clip::infer(&metric, clip, located, &seen, reasoner, config);
+            let result = clip::infer(&rectified, clip, located, &seen, reasoner, config);
             tick("inferring", total);
             result
         })
-        .collect::<Result<_>>()?;
-    let joints = scene::merge(&metric, &clips, reasoner, config)?;
-    let Recording { name: recording, depth_factors, .. } = metric;
+        .collect();
+    let joints = scene::merge(&rectified, &looks.sketches, &clips, reasoner, config);
+    let Recording { name: recording, depth_factors, .. } = rectified;
     Ok(Scene { recording, manhattan: room, depth_factors, clips, joints })
+}
+
+/// What was kept of the frames that were looked at.
+#[derive(Debug, Default)]
+struct Looks {
+    /// Depth and mask, coarsely.
+    sketches: BTreeMap<usize, Sketch>,
+    /// Line segments of the frames in which nothing moves.
+    segments: BTreeMap<usize, Vec<LiftedSegment>>,
+}
+
+/// Decodes what a frame has, once; `None` where it has no depth. Without a detector its lines are not looked for.
+fn look_at(
+    recording: &Recording,
+    frame: usize,
+    detector: Option<&dyn LineDetector>,
+    config: &Config,
+) -> Result<Option<(Sketch, Vec<LiftedSegment>)>> {
+    let Some(depth) = recording.depth_as_read(frame)? else { return Ok(None) };
+    let mask = recording.mask(frame)?;
+    let segments = match detector {
+        Some(detector) => lift(recording, frame, &depth, mask.as_ref(), detector, &config.geometry, config.seed)?,
+        None => Vec::new(),
+    };
+    Ok(Some((Sketch::of(frame, &depth, mask.as_ref()), segments)))
 }
 
 fn sort_unique(frames: &mut Vec<usize>) {

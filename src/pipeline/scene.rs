@@ -1,6 +1,7 @@
 //! Clips of one part to one joint of the scene (§C.2).
 
 use std::cmp::Ordering;
+use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
@@ -8,7 +9,6 @@ use super::clip::part_shape;
 use super::{ClipResult, SceneJoint};
 use crate::articulation::{Articulation, JointKind};
 use crate::config::Config;
-use crate::error::Result;
 use crate::geometry::moved::Rect;
 use crate::geometry::{AxisCandidate, Face, candidates, moved};
 use crate::hands::Trajectory;
@@ -16,15 +16,17 @@ use crate::inference::{self, aggregate};
 use crate::math::Point;
 use crate::reasoning::{Answer, Question, Reasoner};
 use crate::recording::Recording;
+use crate::recording::sketch::Sketch;
 use crate::recording::narration;
 
 /// Clips to scene-level joints (§C.2).
 pub(super) fn merge(
     recording: &Recording,
+    sketches: &BTreeMap<usize, Sketch>,
     clips: &[ClipResult],
     reasoner: &dyn Reasoner,
     config: &Config,
-) -> Result<Vec<SceneJoint>> {
+) -> Vec<SceneJoint> {
     // Clips with a hand take part even where they have no answer of their own: what they show counts.
     let mut seen: Vec<(usize, &ClipResult, &Trajectory)> =
         clips.iter().enumerate().filter_map(|(i, c)| c.trajectory.as_ref().map(|t| (i, c, t))).collect();
@@ -48,12 +50,12 @@ pub(super) fn merge(
         .filter(|g| g.iter().any(|&c| clips[c].joint.found().is_some()))
         .collect();
     let merged: Vec<Option<SceneJoint>> =
-        groups.par_iter().map(|g| merge_group(recording, clips, g, reasoner, config)).collect::<Result<_>>()?;
+        groups.par_iter().map(|g| merge_group(recording, sketches, clips, g, reasoner, config)).collect();
     let mut joints: Vec<SceneJoint> = merged.into_iter().flatten().collect();
     for (i, joint) in joints.iter_mut().enumerate() {
         joint.id = format!("joint_{i}");
     }
-    Ok(joints)
+    joints
 }
 
 /// The candidates of all clips of a part as far as they fit the face of the clip that saw it best.
@@ -89,11 +91,12 @@ fn pooled(
 /// All candidates of all clips of one part, judged on every clip: the best explains all of them.
 fn merge_group(
     recording: &Recording,
+    sketches: &BTreeMap<usize, Sketch>,
     clips: &[ClipResult],
     group: &[usize],
     reasoner: &dyn Reasoner,
     config: &Config,
-) -> Result<Option<SceneJoint>> {
+) -> Option<SceneJoint> {
     // The clip that saw the closed part best gives the face, the grip and the part's outline.
     let trust = |c: usize| -> f64 {
         let clip = &clips[c];
@@ -102,14 +105,11 @@ fn merge_group(
         let held = (-0.5 * ((standoff - config.geometry.grip_standoff_m) / 0.05).powi(2)).exp();
         held * (0.2 + face.support) * if clip.part.is_some() { 2.0 } else { 1.0 }
     };
-    let Some(&best) = group
+    let &best = group
         .iter()
         .filter(|&&c| clips[c].joint.found().is_some())
-        .max_by(|&&a, &&b| trust(a).total_cmp(&trust(b)).then(b.cmp(&a)))
-    else {
-        return Ok(None);
-    };
-    let Some(best_joint) = clips[best].joint.found() else { return Ok(None) };
+        .max_by(|&&a, &&b| trust(a).total_cmp(&trust(b)).then(b.cmp(&a)))?;
+    let best_joint = clips[best].joint.found()?;
     let grip = best_joint.grip;
     let face = clips[best].face;
     let (mut joint, mut type_probability) = (best_joint.joint, best_joint.type_probability);
@@ -123,7 +123,7 @@ fn merge_group(
         let mut answers = Vec::new();
         for &c in group {
             let Some(trajectory) = &clips[c].trajectory else { continue };
-            let open = moved::open_views(recording, &clips[c].clip, trajectory)?;
+            let open = moved::open_views(recording, sketches, &clips[c].clip, trajectory);
             let path = trajectory.positions();
             // Depth and hands are biased clip by clip: the face and the grip of the clip itself fit its views best, those
             // of the best clip stand in where it did not see its closed end. Every candidate gets the same choice.
@@ -161,7 +161,7 @@ fn merge_group(
                 part: clips[best].part.as_ref().map(part_shape),
             }));
         }
-        let Some(answer) = Answer::together(&answers) else { return Ok(None) };
+        let answer = Answer::together(&answers)?;
         let weights = answer.log_weights();
         let revolute_probability = answer.revolute_probability(&pooled);
         let revolute = revolute_probability >= 0.5;
@@ -180,7 +180,7 @@ fn merge_group(
     joint = inference::opening_sense(joint, face.as_ref(), &grip, trajectories());
     let observed_range =
         trajectories().map(|t| inference::observed_range(&joint, &t.closed_grip(), &t.positions())).fold(0.0, f64::max);
-    Ok(Some(SceneJoint {
+    Some(SceneJoint {
         id: String::new(),
         joint,
         clips: group.iter().map(|&c| clips[c].clip.clip.clone()).collect(),
@@ -190,5 +190,5 @@ fn merge_group(
         face,
         part: clips[best].part,
         observed_range,
-    }))
+    })
 }

@@ -1,7 +1,6 @@
 //! A frame's depth and mask at every n-th pixel: small enough to keep for hundreds of frames.
 
-use super::{Camera, Grid, HAND_CLASS, Recording};
-use crate::error::Result;
+use super::{Camera, Grid, HAND_CLASS};
 use crate::math::{Point, Vector, unit};
 
 /// Samples kept of a frame at the most.
@@ -23,13 +22,6 @@ pub struct Sketch {
 }
 
 impl Sketch {
-    /// Decodes a frame; `None` where it has no depth.
-    pub fn load(recording: &Recording, frame: usize) -> Result<Option<Self>> {
-        let Some(depth) = recording.depth_as_read(frame)? else { return Ok(None) };
-        let mask = recording.mask(frame)?;
-        Ok(Some(Self::of(frame, &depth, mask.as_ref())))
-    }
-
     /// Samples decoded images of one size.
     #[must_use]
     pub fn of(frame: usize, depth: &Grid<f32>, mask: Option<&Grid<u8>>) -> Self {
