@@ -31,6 +31,27 @@ pub enum LineMethod {
     Triangulated,
 }
 
+/// How the room's frame is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ManhattanMethod {
+    /// The paper's: k-means of each frame's normals, then mean shift.
+    Clustered,
+    /// Ours: the heading of upright surfaces about the vertical, then all normals and gravity, robustly.
+    Gravity,
+}
+
+/// Which set of values the others start from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// The paper to the letter, as far as it says.
+    Paper,
+    /// What we found to be better.
+    #[default]
+    Ours,
+}
+
 /// Declares one block of the config with its defaults, units and sources in one place.
 macro_rules! block {
     ($(#[doc = $block_doc:literal])* $block:ident, $name:literal, {
@@ -98,6 +119,8 @@ block! {
         global_views: usize = 50, "views", "B.1";
         /// Share of the confident voxels that a global view must have inside its frustum.
         min_visible_share: f64 = 0.3, "share", "ours";
+        /// Global views count a voxel only where nothing stands before it.
+        occlusion: bool = true, "-", "ours";
         /// Only what lies within this distance of the hand can be the touched furniture.
         reach_m: f64 = 1.5, "m", "ours";
         /// Frames of the whole room, outside the interactions, that help to find the scale of depth.
@@ -133,8 +156,9 @@ block! {
         normals_per_frame: usize = 2000, "-", "ours";
         /// Bandwidth of the mean shift over the frames' axes.
         mean_shift_deg: f64 = 12.0, "deg", "ours";
-        /// Refine the room's frame on all normals after the mean shift (the k-means of a noisy wall splits it).
-        refine_manhattan: bool = true, "-", "ours";
+        /// How the room's frame is found: "clustered" (the paper: k-means, then mean shift) or "gravity" (the heading of
+        /// upright surfaces, then all normals robustly).
+        manhattan: ManhattanMethod = ManhattanMethod::Gravity, "-", "ours";
         /// Slab half-width that belongs to a front face.
         face_tolerance_m: f64 = 0.015, "m", "ours";
         /// A grip is about this far in front of its face.
@@ -243,6 +267,8 @@ block! {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
+    /// What the values that a file leaves out are: ours, or the paper's.
+    pub method: Method,
     /// Seed of every random draw.
     pub seed: u64,
     /// §3.1, §A.2.
@@ -265,10 +291,34 @@ impl Config {
     /// Reads a TOML file; keys that are absent keep their defaults, unknown keys and impossible values are errors.
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
-        let config: Self = toml::from_str(&text)
-            .map_err(|e| Error::Config(format!("{}: {}", path.display(), e.to_string().trim_end())))?;
+        let wrong = |e: toml::de::Error| Error::Config(format!("{}: {}", path.display(), e.to_string().trim_end()));
+        // The file's own words first, so that a slip is told with its line; then its values over those of its method.
+        let config: Self = toml::from_str(&text).map_err(wrong)?;
+        let config = match config.method {
+            Method::Ours => config,
+            Method::Paper => {
+                let mut values = toml::Table::try_from(Self::paper()).map_err(|e| Error::Config(e.to_string()))?;
+                overlay(&mut values, toml::from_str(&text).map_err(wrong)?);
+                toml::Value::Table(values).try_into().map_err(wrong)?
+            }
+        };
         config.check().map_err(|e| Error::Config(format!("{}: {e}", path.display())))?;
         Ok(config)
+    }
+
+    /// The paper to the letter, as far as it says; where it is silent our value stands.
+    #[must_use]
+    pub fn paper() -> Self {
+        let mut config = Self { method: Method::Paper, ..Self::default() };
+        config.hands.restart_after = 0;
+        config.hands.widen_secs = 0.0;
+        config.localization.closed_state_frames = false;
+        config.localization.occlusion = false;
+        config.geometry.depth_scale = false;
+        config.geometry.lines = LineMethod::Unprojected;
+        config.geometry.manhattan = ManhattanMethod::Clustered;
+        config.inference.use_face_normal = false;
+        config
     }
 
     /// All values with unit, source and meaning, in the order of the pipeline.
@@ -288,7 +338,12 @@ impl Config {
     /// The whole configuration as TOML with unit, section and meaning as comments; [`Config::read`] takes it back.
     #[must_use]
     pub fn to_toml(&self) -> String {
-        let mut text = format!("# Seed of every random draw.\nseed = {}\n", self.seed);
+        let method = if self.method == Method::Paper { "paper" } else { "ours" };
+        let mut text = format!(
+            "# What values left out are: \"ours\", or the \"paper\" to the letter.\nmethod = \"{method}\"\n\
+             # Seed of every random draw.\nseed = {}\n",
+            self.seed
+        );
         let mut block = "";
         let rows = self.rows();
         for row in &rows {
@@ -323,6 +378,18 @@ impl Config {
             return Err("localization.min_views is above local_frames: no voxel could ever be confident".to_owned());
         }
         Ok(())
+    }
+}
+
+/// Puts a file's values over others, table by table.
+fn overlay(under: &mut toml::Table, over: toml::Table) {
+    for (key, value) in over {
+        match (under.get_mut(&key), value) {
+            (Some(toml::Value::Table(under)), toml::Value::Table(over)) => overlay(under, over),
+            (_, value) => {
+                under.insert(key, value);
+            }
+        }
     }
 }
 
@@ -380,6 +447,19 @@ mod tests {
         ] {
             assert_eq!(value(key), expected, "{key}");
         }
+    }
+
+    #[test]
+    fn the_papers_method_is_a_word_in_a_file_and_single_keys_may_differ() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("c.toml");
+        std::fs::write(&path, "method = \"paper\"\n[geometry]\ndepth_scale = true\n").unwrap();
+        let mut expected = Config::paper();
+        expected.geometry.depth_scale = true;
+        assert_eq!(Config::read(&path).unwrap(), expected);
+        std::fs::write(&path, Config::paper().to_toml()).unwrap();
+        assert_eq!(Config::read(&path).unwrap(), Config::paper());
+        assert_ne!(Config::paper(), Config::default());
     }
 
     #[test]

@@ -21,6 +21,10 @@ pub fn run(args: &ConfigArgs) -> anyhow::Result<Answer> {
         return Ok(Answer::Yes);
     }
     let mut rows = vec![["parameter", "value", "unit", "source", "meaning"].map(str::to_owned).to_vec()];
+    let method = if config.method == crate::config::Method::Paper { "paper" } else { "ours" };
+    rows.push(
+        ["method", method, "-", "ours", "What the others start from: ours, or paper."].map(str::to_owned).to_vec(),
+    );
     rows.push(
         ["seed", &config.seed.to_string(), "-", "ours", "Seed of every random draw."].map(str::to_owned).to_vec(),
     );

@@ -69,14 +69,18 @@ enum Command {
 /// Arguments of all commands that run steps of the pipeline.
 #[derive(Debug, Clone, Default, Args)]
 pub struct ConfigFile {
-    /// Parameters to change, as TOML (`paws config --toml` prints all of them)
+    /// Parameters to change, as TOML (`paws config --toml` prints all of them), or the word `paper`: the paper to the letter
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
 }
 
 impl ConfigFile {
     fn read(&self) -> crate::error::Result<Config> {
-        self.config.as_deref().map_or_else(|| Ok(Config::default()), Config::read)
+        match self.config.as_deref() {
+            None => Ok(Config::default()),
+            Some(word) if word == Path::new("paper") && !word.exists() => Ok(Config::paper()),
+            Some(file) => Config::read(file),
+        }
     }
 }
 

@@ -216,8 +216,7 @@ pub fn measure(scene: &Scene, truth: &SceneTruth) -> Stages {
             true => (0..scales.len()).collect(),
             false => factors.by_frame.keys().copied().collect(),
         };
-        out.depth_scale_error =
-            frames.iter().filter_map(|&f| scales.get(f).map(|s| left(*s, factors.of(f)))).collect();
+        out.depth_scale_error = frames.iter().filter_map(|&f| scales.get(f).map(|s| left(*s, factors.of(f)))).collect();
     } else if let Some(scale) = truth.depth_scale_recording {
         out.depth_scale_error = vec![left(scale, factors.other)];
     }
@@ -290,7 +289,13 @@ mod tests {
         };
         let total: f64 = box_edges(&b).iter().map(Segment::length).sum();
         assert!((total - 4.0 * (0.2 + 0.4 + 0.6)).abs() < 1e-12);
-        assert!(box_edges(&b).iter().all(|e| e.ends().iter().all(|p| b.thickened(0.0).corners().iter().any(|c| (c - p).norm() < 1e-9))));
+        assert!(
+            box_edges(&b).iter().all(|e| e.ends().iter().all(|p| b
+                .thickened(0.0)
+                .corners()
+                .iter()
+                .any(|c| (c - p).norm() < 1e-9)))
+        );
     }
 
     #[test]

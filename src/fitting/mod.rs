@@ -348,7 +348,13 @@ mod tests {
     }
 
     fn twin(joints: Vec<SceneJoint>) -> Twin {
-        let scene = Scene { recording: "r".to_owned(), manhattan: None, depth_factors: Default::default(), clips: vec![], joints };
+        let scene = Scene {
+            recording: "r".to_owned(),
+            manhattan: None,
+            depth_factors: Default::default(),
+            clips: vec![],
+            joints,
+        };
         fit(&scene, &Vector::z(), &config::Fitting::default())
     }
 

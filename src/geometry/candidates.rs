@@ -15,6 +15,8 @@ use crate::math::{Point, Vector, circle, unsigned_angle};
 pub enum AxisSource {
     /// A 3D line seen in several views.
     Line,
+    /// Where the face meets another side of the furniture.
+    PlaneEdge,
     /// An edge of the part that was seen to move.
     PartEdge,
     /// An edge of the visible face, which may belong to the whole piece of furniture.
@@ -58,6 +60,8 @@ pub struct AxisCandidate {
     pub views: usize,
     /// Length of the line, for lines and edges, metres.
     pub length_m: f64,
+    /// How well its source places a hinge across its axis: a standard deviation, metres.
+    pub position_std_m: f64,
     /// How far the hand's path has moved a hinge from where its source put it, in standard deviations of the source.
     pub shift: f64,
 }
@@ -67,8 +71,8 @@ impl AxisSource {
     #[must_use]
     pub fn position_std_m(self) -> f64 {
         match self {
-            // Depth scale and unprojection.
-            Self::Line => 0.03,
+            // A hinge is set back from the edge that one sees; what the line's own fit adds is its own.
+            Self::Line | Self::PlaneEdge => 0.02,
             // Next to a hinge a door hardly moves, so the outline ends a few centimetres short of it.
             Self::PartEdge => 0.06,
             Self::FaceEdge => 0.08,
@@ -92,7 +96,7 @@ pub fn settled(candidate: &AxisCandidate, paths: &[Vec<Point>], reasoning: &conf
         .iter()
         .map(|path| path.iter().map(|p| Point2::new((p - origin).dot(&e1), (p - origin).dot(&e2))).collect())
         .collect();
-    let std_m = candidate.source.position_std_m();
+    let std_m = candidate.position_std_m;
     let prior = circle::CenterPrior {
         center: Point2::origin(),
         std_m,
@@ -118,6 +122,8 @@ pub struct Evidence<'a> {
     pub rect: Option<&'a Rect>,
     /// 3D lines at the region.
     pub tracks: &'a [LineTrack],
+    /// Points of the touched furniture, world.
+    pub surface: &'a [Point],
     /// The room's frame.
     pub manhattan: Option<&'a ManhattanFrame>,
     /// The grip at the closed end.
@@ -175,6 +181,23 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
                 side: Some(side_of(if upright { right } else { up }, upright)),
                 views: track.views.len(),
                 length_m: track.segment.length(),
+                position_std_m: AxisSource::Line.position_std_m().hypot(track.position_std_m()),
+                shift: 0.0,
+            });
+        }
+        for (axis, offset, length_m) in plane_edges(face, evidence.surface) {
+            let upright = axis == 0;
+            let source = AxisSource::PlaneEdge;
+            let middle = evidence.rect.map_or([0.0; 2], |r| r.bounds.map(|b| 0.5 * (b[0] + b[1])));
+            let origin = if upright { face.point(offset, middle[1], 0.0) } else { face.point(middle[0], offset, 0.0) };
+            let axis = if upright { face.up } else { face.right };
+            out.push(AxisCandidate {
+                joint: Articulation { kind: JointKind::Revolute, axis, origin },
+                source,
+                side: Some(side_of(offset, upright)),
+                views: 0,
+                length_m,
+                position_std_m: source.position_std_m(),
                 shift: 0.0,
             });
         }
@@ -194,6 +217,7 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
                 side: Some(side),
                 views: 0,
                 length_m,
+                position_std_m: source.position_std_m(),
                 shift: 0.0,
             }));
         }
@@ -210,6 +234,7 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
                 side: None,
                 views: track.views.len(),
                 length_m: track.segment.length(),
+                position_std_m: AxisSource::Line.position_std_m().hypot(track.position_std_m()),
                 shift: 0.0,
             });
         }
@@ -222,9 +247,47 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
         if let Some(joint) = arc_about(evidence.path, &direction) {
             let shift = evidence.face.map_or(0.0, |face| implausibility(face, &joint));
             let side = evidence.face.map(|face| side_at(face, &direction, &joint.origin));
-            out.push(AxisCandidate { joint, source: AxisSource::HandArc, side, views: 0, length_m: 0.0, shift });
+            let source = AxisSource::HandArc;
+            let position_std_m = source.position_std_m();
+            out.push(AxisCandidate { joint, source, side, views: 0, length_m: 0.0, position_std_m, shift });
         }
     }
+}
+
+/// Where other sides of the furniture meet its face: (0 = upright edge or 1 = level one, its offset, the length seen), in face
+/// coordinates. A side is a dense thin slab of points behind the face, square to it.
+fn plane_edges(face: &Face, surface: &[Point]) -> Vec<(usize, f64, f64)> {
+    const SLAB_M: f64 = 0.02;
+    // Behind the front board and its noise, not as deep as the wall.
+    const DEPTH_M: std::ops::Range<f64> = 0.05..0.5;
+    let behind: Vec<[f64; 3]> =
+        surface.iter().map(|p| face.coordinates(p)).filter(|c| DEPTH_M.contains(&-c[2])).collect();
+    let mut out = Vec::new();
+    for axis in [0, 1] {
+        let mut slabs: std::collections::BTreeMap<i64, Vec<[f64; 3]>> = std::collections::BTreeMap::new();
+        for c in &behind {
+            slabs.entry((c[axis] / SLAB_M).floor() as i64).or_default().push(*c);
+        }
+        let empty = Vec::new();
+        for (slab, points) in &slabs {
+            // A side is seen over some depth and some length; a slab with less than a third of all is the inside's clutter.
+            let beside = [slab - 1, slab + 1].map(|s| slabs.get(&s).unwrap_or(&empty).len());
+            if 3 * points.len() < behind.len() || points.len() <= beside[0].max(beside[1]) {
+                continue;
+            }
+            let spread = |k: usize| {
+                let values: Vec<f64> = points.iter().map(|c| c[k]).collect();
+                let low = crate::math::stats::quantile(&values, 0.05);
+                low.zip(crate::math::stats::quantile(&values, 0.95)).map_or(0.0, |(l, h)| h - l)
+            };
+            let length = spread(1 - axis);
+            if points.len() >= 100 && length > 0.15 && spread(2) > 0.1 {
+                let values: Vec<f64> = points.iter().map(|c| c[axis]).collect();
+                out.extend(crate::math::stats::median(&values).map(|offset| (axis, offset, length)));
+            }
+        }
+    }
+    out
 }
 
 /// How far the centre of an arc lies from where a hinge can be, in standard deviations: off the plane of the face, or
@@ -274,7 +337,8 @@ fn slides(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
     let origin = evidence.path.first().copied().unwrap_or(evidence.grip);
     let mut push = |axis: Vector, source: AxisSource| {
         let joint = Articulation { kind: JointKind::Prismatic, axis, origin };
-        out.push(AxisCandidate { joint, source, side: None, views: 0, length_m: 0.0, shift: 0.0 });
+        let position_std_m = source.position_std_m();
+        out.push(AxisCandidate { joint, source, side: None, views: 0, length_m: 0.0, position_std_m, shift: 0.0 });
     };
     if let Some(face) = evidence.face.filter(|_| config.use_face_normal) {
         push(face.normal, AxisSource::FaceNormal);
@@ -312,6 +376,26 @@ pub fn arc_about(path: &[Point], direction: &Vector) -> Option<Articulation> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_side_of_a_cupboard_meets_its_front_at_its_edge() {
+        let face = Face {
+            center: Point::new(0.0, 0.0, 1.0),
+            right: Vector::x(),
+            up: Vector::z(),
+            normal: -Vector::y(),
+            extent: [[-0.3, 0.3]; 2],
+            support: 1.0,
+        };
+        let side: Vec<Point> = (0..900)
+            .map(|i| {
+                Point::new(0.302 + 0.002 * f64::from(i % 3), 0.01 * f64::from(i % 30), 0.7 + 0.02 * f64::from(i / 30))
+            })
+            .collect();
+        let found = plane_edges(&face, &side);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(found[0].0 == 0 && (found[0].1 - 0.304).abs() < 3e-3, "{found:?}");
+    }
 
     #[test]
     fn the_arc_of_a_door_is_its_hinge() {

@@ -70,10 +70,7 @@ pub fn solve(recording: &Recording, sketches: &BTreeMap<usize, Sketch>) -> Depth
     if views.len() < 2 {
         return DepthFactors::default();
     }
-    let partners: Vec<Vec<usize>> = (0..views.len())
-        .into_par_iter()
-        .map(|a| partners(recording, &views, a))
-        .collect();
+    let partners: Vec<Vec<usize>> = (0..views.len()).into_par_iter().map(|a| partners(recording, &views, a)).collect();
     let mut factors = vec![1.0; views.len()];
     'gates: for gate_m in GATES_M {
         for _ in 0..ROUNDS {
@@ -87,7 +84,14 @@ pub fn solve(recording: &Recording, sketches: &BTreeMap<usize, Sketch>) -> Depth
             let Some(next) = adjust(&links, &factors, gate_m) else { break 'gates };
             let moved = next.iter().zip(&factors).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             factors = next;
-        if std::env::var_os("DBG").is_some() { let n: usize = links.iter().map(Vec::len).sum(); let rms = (links.iter().flatten().map(|l| l.residual(&factors).powi(2)).sum::<f64>() / n as f64).sqrt(); eprintln!("{gate_m} links {n} rms {rms:.4} moved {moved:.4} median {:.4}", stats::median(&factors).unwrap()); }
+            if std::env::var_os("DBG").is_some() {
+                let n: usize = links.iter().map(Vec::len).sum();
+                let rms = (links.iter().flatten().map(|l| l.residual(&factors).powi(2)).sum::<f64>() / n as f64).sqrt();
+                eprintln!(
+                    "{gate_m} links {n} rms {rms:.4} moved {moved:.4} median {:.4}",
+                    stats::median(&factors).unwrap()
+                );
+            }
             if moved < 5e-4 {
                 break;
             }

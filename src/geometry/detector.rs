@@ -143,16 +143,12 @@ impl Field {
         let gradient_noise = noise / (8.0 * std::f64::consts::PI).sqrt() / (sigma * sigma);
         let least = LEAST_GRADIENT.max(NOISE_GATE * gradient_noise) * 2.0 * f64::from(1 << BITS);
         let least2 = (least * least) as i32;
-        let mut field =
-            Self { width: w, height: h, gx: vec![0; w * h], gy: vec![0; w * h], order: Vec::new() };
+        let mut field = Self { width: w, height: h, gx: vec![0; w * h], gy: vec![0; w * h], order: Vec::new() };
         let mut steep: Vec<(u32, i32)> = Vec::with_capacity(w * h / 8);
         let mut size2 = vec![0i32; w];
         for y in 1..h - 1 {
-            let (above, row, below) = (
-                &smoothed[(y - 1) * w..y * w],
-                &smoothed[y * w..(y + 1) * w],
-                &smoothed[(y + 1) * w..(y + 2) * w],
-            );
+            let (above, row, below) =
+                (&smoothed[(y - 1) * w..y * w], &smoothed[y * w..(y + 1) * w], &smoothed[(y + 1) * w..(y + 2) * w]);
             let gx = &mut field.gx[y * w..(y + 1) * w];
             let gy = &mut field.gy[y * w..(y + 1) * w];
             for ((g, r), l) in gx[1..w - 1].iter_mut().zip(&row[2..]).zip(&row[..w - 2]) {
@@ -246,13 +242,7 @@ impl Field {
     }
 
     /// Cuts a region to the piece around its seed that fills a rectangle; frees what is cut off.
-    fn straightened(
-        &self,
-        seed: u32,
-        region: &mut Vec<u32>,
-        used: &mut [bool],
-        min_length: f64,
-    ) -> Option<Rectangle> {
+    fn straightened(&self, seed: u32, region: &mut Vec<u32>, used: &mut [bool], min_length: f64) -> Option<Rectangle> {
         let at = |i: u32| [(i as usize % self.width) as f64, (i as usize / self.width) as f64];
         let from = at(seed);
         loop {

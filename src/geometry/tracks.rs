@@ -99,15 +99,9 @@ impl Nearness {
 
 /// The paper's lines: lifted segments of a clip's views at its region, grouped and fitted with LO-RANSAC.
 #[must_use]
-pub fn unprojected(
-    lifted: &[&LiftedSegment],
-    region: &Region,
-    config: &config::Geometry,
-    seed: u64,
-) -> Vec<LineTrack> {
+pub fn unprojected(lifted: &[&LiftedSegment], region: &Region, config: &config::Geometry, seed: u64) -> Vec<LineTrack> {
     let around = Nearness::new(region);
-    let near: Vec<&LiftedSegment> =
-        lifted.iter().copied().filter(|s| around.stretch(&s.segment).is_some()).collect();
+    let near: Vec<&LiftedSegment> = lifted.iter().copied().filter(|s| around.stretch(&s.segment).is_some()).collect();
     let mut tracks: Vec<LineTrack> = groups(&near, config)
         .into_iter()
         .enumerate()
@@ -550,7 +544,8 @@ mod tests {
     fn recording() -> Recording {
         let frames = (0..8)
             .map(|i| {
-                let eye = Vector::new(-0.7 + 0.2 * f64::from(i), -1.6 - 0.05 * f64::from(i % 3), 0.1 * f64::from(i % 4));
+                let eye =
+                    Vector::new(-0.7 + 0.2 * f64::from(i), -1.6 - 0.05 * f64::from(i % 3), 0.1 * f64::from(i % 4));
                 let turn = nalgebra::UnitQuaternion::from_axis_angle(&Vector::x_axis(), -std::f64::consts::FRAC_PI_2);
                 let world_from_camera = Pose::from_parts(eye.into(), turn);
                 Frame { timestamp_secs: f64::from(i), world_from_camera, files: Default::default() }
@@ -597,8 +592,7 @@ mod tests {
         let recording = recording();
         let ends = [Point::new(0.1, 0.0, -0.3), Point::new(0.1, 0.02, 0.4)];
         let lifted = lift(&recording, ends, |v| if v % 2 == 0 { 0.02 } else { -0.015 });
-        let tracks =
-            triangulated(&recording, &lifted.iter().collect::<Vec<_>>(), &config::Geometry::default(), 0);
+        let tracks = triangulated(&recording, &lifted.iter().collect::<Vec<_>>(), &config::Geometry::default(), 0);
         assert_eq!(tracks.len(), 1, "{tracks:#?}");
         let track = &tracks[0];
         assert_eq!(track.views.len(), 8);
@@ -615,8 +609,7 @@ mod tests {
         let edge = |z: f64| [Point::new(-0.4, 0.0, z), Point::new(0.4, 0.0, z)];
         let mut lifted = lift(&recording, edge(0.0), |v| 0.01 * (v % 3) as f64);
         lifted.extend(lift(&recording, edge(0.035), |v| -0.01 * (v % 2) as f64));
-        let tracks =
-            triangulated(&recording, &lifted.iter().collect::<Vec<_>>(), &config::Geometry::default(), 0);
+        let tracks = triangulated(&recording, &lifted.iter().collect::<Vec<_>>(), &config::Geometry::default(), 0);
         let mut heights: Vec<f64> = tracks.iter().map(|t| t.segment.middle().z).collect();
         heights.sort_by(f64::total_cmp);
         assert_eq!(heights.len(), 2, "{heights:?}");

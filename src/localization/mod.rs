@@ -119,9 +119,7 @@ fn others<'a>(
     grip: &Point,
 ) -> Vec<&'a Sketch> {
     const COUNT: usize = 40;
-    let at_work = |f: usize| {
-        (clip.start_frame..=clip.end_frame).contains(&f) || views::interacting(recording, f)
-    };
+    let at_work = |f: usize| (clip.start_frame..=clip.end_frame).contains(&f) || views::interacting(recording, f);
     let all: Vec<&Sketch> = sketches
         .values()
         .filter(|s| !local.contains(&s.frame) && !at_work(s.frame) && sees(recording, s.frame, grip))

@@ -1,32 +1,119 @@
 //! Frustum test and farthest-point reselection of global views (§3.2, §A.3).
 
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
 use crate::config;
 use crate::math::{Point, centroid};
 use crate::recording::Recording;
+use crate::recording::sketch::Sketch;
 
-use super::Region;
+use super::{Region, voxels};
+
+/// Where surfaces are, on a coarse grid of the whole scene: what may stand between a camera and a place.
+#[derive(Debug)]
+pub struct Occupancy {
+    low: [i32; 3],
+    size: [usize; 3],
+    full: Vec<bool>,
+}
+
+impl Occupancy {
+    /// Edge of a cell: what hides a front is larger, a handle and the noise of depth are smaller.
+    const CELL_M: f64 = 0.1;
+    /// More cells than a house of 20 x 20 x 4 m has: a scene with a stray point far away is not gridded whole.
+    const MAX_CELLS: usize = 8_000_000;
+    /// Views that must agree on a surface; one may show somebody's arm.
+    const VIEWS: u16 = 3;
+
+    /// From the depth of all frames that were looked at.
+    #[must_use]
+    pub fn of(recording: &Recording, sketches: &BTreeMap<usize, Sketch>) -> Self {
+        let cells = |p: &Point| voxels::index(p, Self::CELL_M);
+        let clouds: Vec<Vec<[i32; 3]>> = sketches
+            .par_iter()
+            .map(|(_, sketch)| {
+                let mut seen: Vec<[i32; 3]> =
+                    super::points(recording, sketch, None).iter().step_by(3).map(cells).collect();
+                seen.sort_unstable();
+                seen.dedup();
+                seen
+            })
+            .collect();
+        let all = || clouds.iter().flatten();
+        let bound = |k: usize, q: f64| {
+            let values: Vec<f64> = all().map(|c| f64::from(c[k])).collect();
+            crate::math::stats::quantile(&values, q).unwrap_or(0.0) as i32
+        };
+        let low = [0, 1, 2].map(|k| bound(k, 0.002));
+        let size = [0, 1, 2].map(|k| (bound(k, 0.998) - low[k] + 1).max(1) as usize);
+        if size.iter().product::<usize>() > Self::MAX_CELLS {
+            return Self { low, size: [0; 3], full: Vec::new() };
+        }
+        let mut grid = Self { low, size, full: Vec::new() };
+        let mut counts = vec![0u16; size.iter().product()];
+        for cell in all() {
+            if let Some(i) = grid.index(cell) {
+                counts[i] = counts[i].saturating_add(1);
+            }
+        }
+        grid.full = counts.into_iter().map(|n| n >= Self::VIEWS).collect();
+        grid
+    }
+
+    fn index(&self, cell: &[i32; 3]) -> Option<usize> {
+        let mut index = 0;
+        for k in 0..3 {
+            let at = usize::try_from(cell[k] - self.low[k]).ok().filter(|at| *at < self.size[k])?;
+            index = index * self.size[k] + at;
+        }
+        Some(index)
+    }
+
+    /// Whether something stands between two points, apart from what is around either.
+    #[must_use]
+    pub fn hides(&self, eye: &Point, target: &Point) -> bool {
+        /// The target's own surroundings, and the person's hands and hair.
+        const CLEAR_M: f64 = 0.25;
+        let way = target - eye;
+        let length = way.norm();
+        let steps = ((length - 2.0 * CLEAR_M) / (0.7 * Self::CELL_M)).floor().max(0.0) as usize;
+        (0..steps).any(|i| {
+            let p = eye + way * ((CLEAR_M + 0.7 * Self::CELL_M * i as f64) / length);
+            self.index(&voxels::index(&p, Self::CELL_M)).is_some_and(|i| self.full[i])
+        })
+    }
+}
 
 /// Selects up to `global_views` frames outside the interactions that see the region, spread over camera positions.
 ///
 /// The first is the one nearest to the region (the paper leaves the start open), each next one the farthest from all
-/// before it.
+/// before it. With an `occupancy` a voxel counts as seen only where nothing hides it.
 #[must_use]
-pub fn reselect(recording: &Recording, region: &Region, config: &config::Localization) -> Vec<usize> {
+pub fn reselect(
+    recording: &Recording,
+    region: &Region,
+    occupancy: Option<&Occupancy>,
+    config: &config::Localization,
+) -> Vec<usize> {
+    /// A sample of the region's voxels tells the share that is seen to a few per cent.
+    const PROBES: usize = 60;
     let centers = region.centers();
     let Some(middle) = centroid(&centers) else { return Vec::new() };
+    let probes: Vec<Point> = centers.iter().copied().step_by(centers.len().div_ceil(PROBES)).collect();
     let mut candidates: Vec<usize> = (0..recording.frames.len())
-        .filter(|&f| !interacting(recording, f) && recording.frames[f].files.rgb.is_some())
-        .filter(|&f| visible_share(recording, f, &centers) >= config.min_visible_share)
+        .into_par_iter()
+        .filter(|&f| recording.frames[f].files.rgb.is_some() && !interacting(recording, f))
+        .filter(|&f| visible_share(recording, f, &probes, occupancy, config.min_visible_share))
         .collect();
     // The local frames show the closed state from near by, whatever the clips' bounds say.
     candidates.extend(region.local_frames.iter().filter(|f| recording.frames[**f].files.rgb.is_some()));
     candidates.sort_unstable();
     candidates.dedup();
-
     let distance = |f: usize| (recording.frames[f].center() - middle).norm();
-    let start = (0..candidates.len())
-        .min_by(|&a, &b| distance(candidates[a]).total_cmp(&distance(candidates[b])))
-        .unwrap_or(0);
+    let start =
+        (0..candidates.len()).min_by(|&a, &b| distance(candidates[a]).total_cmp(&distance(candidates[b]))).unwrap_or(0);
     spread(recording, &candidates, start, config.global_views)
 }
 
@@ -68,16 +155,46 @@ fn spread(recording: &Recording, candidates: &[usize], start: usize, count: usiz
     chosen
 }
 
-/// Share of the points inside a frame's frustum, between 0.2 and 3 m from the camera.
-fn visible_share(recording: &Recording, frame: usize, points: &[Point]) -> f64 {
+/// Whether at least a share of the points is inside a frame's frustum, between 0.2 and 3 m from the camera, and not hidden.
+fn visible_share(
+    recording: &Recording,
+    frame: usize,
+    points: &[Point],
+    occupancy: Option<&Occupancy>,
+    share: f64,
+) -> bool {
     let camera_from_world = recording.frames[frame].world_from_camera.inverse();
-    let inside = points
-        .iter()
-        .filter(|p| {
-            let local = camera_from_world * **p;
-            (0.2..3.0).contains(&local.z)
-                && recording.camera.project(&local).is_some_and(|(u, v)| recording.camera.contains(u, v))
-        })
-        .count();
-    inside as f64 / points.len().max(1) as f64
+    let eye = recording.frames[frame].center();
+    let needed = (share * points.len() as f64).ceil() as usize;
+    let inside = |p: &&Point| {
+        let local = camera_from_world * **p;
+        (0.2..3.0).contains(&local.z)
+            && recording.camera.project(&local).is_some_and(|(u, v)| recording.camera.contains(u, v))
+    };
+    // The cheap test first: most frames of a long recording look elsewhere.
+    let in_frustum: Vec<&Point> = points.iter().filter(inside).collect();
+    in_frustum.len() >= needed
+        && occupancy.is_none_or(|o| in_frustum.iter().filter(|p| !o.hides(&eye, p)).count() >= needed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wall_hides_what_is_behind_it_and_not_what_is_before_or_on_it() {
+        let mut full = vec![false; 40 * 40 * 40];
+        let mut grid = Occupancy { low: [0; 3], size: [40; 3], full: Vec::new() };
+        for y in 0..40 {
+            for z in 0..40 {
+                full[grid.index(&[20, y, z]).unwrap()] = true;
+            }
+        }
+        grid.full = full;
+        let eye = Point::new(0.55, 2.0, 2.0);
+        assert!(grid.hides(&eye, &Point::new(3.5, 2.2, 1.8)));
+        assert!(!grid.hides(&eye, &Point::new(2.05, 2.0, 2.0)));
+        assert!(!grid.hides(&eye, &Point::new(1.5, 2.5, 2.0)));
+        assert!(!grid.hides(&Point::new(-3.0, 0.0, 9.0), &Point::new(-3.0, 5.0, 9.0)));
+    }
 }

@@ -56,6 +56,7 @@ pub(super) fn locate(
     clip: &Clip,
     followed: Followed,
     sketches: &BTreeMap<usize, Sketch>,
+    occupancy: Option<&views::Occupancy>,
     config: &Config,
 ) -> Located {
     let mut located =
@@ -69,7 +70,7 @@ pub(super) fn locate(
     };
     match localization::localize(recording, clip, &trajectory, sketches, &config.localization) {
         Outcome::Found(region) => {
-            located.views = views::reselect(recording, &region, &config.localization);
+            located.views = views::reselect(recording, &region, occupancy, &config.localization);
             located.region = Some(region);
         }
         Outcome::Abstained(reason) => located.reason = Some(reason),
@@ -139,6 +140,7 @@ pub(super) fn infer(
             face: result.face.as_ref(),
             rect: result.part.as_ref(),
             tracks: &result.lines,
+            surface: &surface,
             manhattan: seen.room,
             grip: region.grip,
             path: &path,

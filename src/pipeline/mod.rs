@@ -143,18 +143,21 @@ pub fn infer(
     };
 
     let mut still: Vec<usize> = followed.iter().flat_map(|f| f.closed.iter().copied()).collect();
-    still.extend(views::survey(recording, config.localization.survey_frames));
+    if config.localization.closed_state_frames || config.geometry.depth_scale {
+        still.extend(views::survey(recording, config.localization.survey_frames));
+    }
     look(&mut looks, still, true)?;
     look(&mut looks, followed.iter().flat_map(|f| f.open.iter().copied()).collect(), false)?;
     let rectified = metric(&looks);
     let total = recording.clips.len();
     start("localising", total);
+    let occupancy = config.localization.occlusion.then(|| views::Occupancy::of(&rectified, &looks.sketches));
     let located: Vec<clip::Located> = recording
         .clips
         .par_iter()
         .zip(followed)
         .map(|(clip, followed)| {
-            let located = clip::locate(&rectified, clip, followed, &looks.sketches, config);
+            let located = clip::locate(&rectified, clip, followed, &looks.sketches, occupancy.as_ref(), config);
             tick("localising", total);
             located
         })

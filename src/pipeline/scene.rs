@@ -16,8 +16,8 @@ use crate::inference::{self, aggregate};
 use crate::math::Point;
 use crate::reasoning::{Answer, Question, Reasoner};
 use crate::recording::Recording;
-use crate::recording::sketch::Sketch;
 use crate::recording::narration;
+use crate::recording::sketch::Sketch;
 
 /// Clips to scene-level joints (§C.2).
 pub(super) fn merge(
@@ -148,7 +148,10 @@ fn merge_group(
                         .iter()
                         .map(|(f, rect, grip)| moved::agreement(f, rect.as_ref(), &k.joint, grip, &open))
                         // A share of few points is noise.
-                        .max_by(|a, b| (a.1 >= 100, a.0).partial_cmp(&(b.1 >= 100, b.0)).unwrap_or(Ordering::Equal))
+                        .max_by(|a, b| {
+                            let rank = |x: &(f64, usize)| (x.1 >= moved::MIN_POINTS, x.0);
+                            rank(a).partial_cmp(&rank(b)).unwrap_or(Ordering::Equal)
+                        })
                         .unwrap_or((0.0, 0))
                 })
                 .collect();

@@ -109,6 +109,7 @@ fn log_priors(question: &Question) -> Vec<f64> {
 fn source_prior(source: AxisSource) -> f64 {
     match source {
         AxisSource::Line => 0.5,
+        AxisSource::PlaneEdge => 0.1,
         AxisSource::PartEdge => 0.35,
         AxisSource::FaceEdge => 0.1,
         AxisSource::HandArc => 0.12,
@@ -162,6 +163,7 @@ mod tests {
             side: None,
             views: 0,
             length_m: 0.5,
+            position_std_m: 0.03,
             shift: 0.0,
         }
     }

@@ -115,8 +115,7 @@ mod tests {
         npy.extend(header.as_bytes());
         npy.extend(data);
         let mut zip = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
-        let options =
-            zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
+        let options = zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
         zip.start_file(name, options).unwrap();
         zip.write_all(&npy).unwrap();
         zip.finish().unwrap().into_inner()

@@ -79,9 +79,12 @@ pub fn clip_reason(clip: &ClipResult) -> String {
 
 /// Where an axis comes from.
 fn source(source: crate::geometry::AxisSource) -> &'static str {
-    use crate::geometry::AxisSource::{FaceAxis, FaceEdge, FaceNormal, HandArc, HandPath, Line, Manhattan, PartEdge};
+    use crate::geometry::AxisSource::{
+        FaceAxis, FaceEdge, FaceNormal, HandArc, HandPath, Line, Manhattan, PartEdge, PlaneEdge,
+    };
     match source {
         Line => "a line seen in several views",
+        PlaneEdge => "where two sides of the furniture meet",
         PartEdge => "an edge of the part that moved",
         FaceEdge => "an edge of the face",
         HandArc => "the arc of the hand",
