@@ -221,7 +221,7 @@ impl Field {
             next += 1;
             // The rim holds no gradients, so all eight neighbours of a steep pixel exist.
             for base in [i - self.width, i, i + self.width] {
-                for j in base - 1..=base + 1 {
+                for j in [base - 1, base, base + 1] {
                     if used[j] {
                         continue;
                     }

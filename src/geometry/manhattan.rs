@@ -78,8 +78,8 @@ fn refine(start: [Vector; 3], normals: &[Vector], up: &Vector) -> [Vector; 3] {
     let cut = 25f64.to_radians();
     let mut axes = start;
     for round in 0..ROUNDS {
-        // Wide weights first, to arrive; then about the noise of estimated normals, to be robust.
-        let scale: f64 = if round < ROUNDS / 2 { 15f64.to_radians() } else { 6f64.to_radians() };
+        // Wide weights first, to arrive; then about the normals' own noise, to be robust and waste none of them.
+        let scale = if round < ROUNDS / 2 { 15f64.to_radians() } else { spread(&axes, normals, cut) };
         let mut pull = up * axes[2].transpose() * (0.02 * normals.len() as f64);
         for n in normals {
             let mut best = (0, 0.0);
@@ -111,6 +111,15 @@ fn refine(start: [Vector; 3], normals: &[Vector], up: &Vector) -> [Vector; 3] {
         axes = axes.map(|a| (turn * a).normalize());
     }
     axes
+}
+
+/// Median angle of the normals to their axes (those within the cut), between 3 and 15 degrees.
+fn spread(axes: &[Vector; 3], normals: &[Vector], cut: f64) -> f64 {
+    let angle = |n: &Vector| axes.iter().map(|a| n.dot(a).abs()).fold(0.0, f64::max).min(1.0).acos();
+    // A sample tells it well enough.
+    let angles: Vec<f64> =
+        normals.iter().step_by((normals.len() / 4000).max(1)).map(angle).filter(|a| *a <= cut).collect();
+    crate::math::stats::median(&angles).unwrap_or(cut).clamp(3f64.to_radians(), 15f64.to_radians())
 }
 
 /// Camera-frame normals of a view: from its normals file, else from the slope of its depth.

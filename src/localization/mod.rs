@@ -83,7 +83,7 @@ pub fn localize(
     // Fewer views than asked for where nothing reaches them: a coarse region is better than none, and it says so.
     for min_views in (1..=config.min_views).rev() {
         let confident: Vec<[i32; 3]> =
-            counts.iter().filter(|(_, n)| **n as usize >= min_views).map(|(v, _)| *v).collect();
+            counts.iter().filter(|(_, n)| *n as usize >= min_views).map(|(v, _)| *v).collect();
         let connected = voxels::connected_with(&confident, &grip, config.voxel_m);
         // A face of 30 x 30 cm fills 36 voxels of 5 cm; a third of that is no furniture.
         if connected.len() >= 12 {

@@ -63,12 +63,10 @@ impl Occupancy {
     }
 
     fn index(&self, cell: &[i32; 3]) -> Option<usize> {
-        let mut index = 0;
-        for k in 0..3 {
-            let at = usize::try_from(cell[k] - self.low[k]).ok().filter(|at| *at < self.size[k])?;
-            index = index * self.size[k] + at;
-        }
-        Some(index)
+        cell.iter().zip(&self.low).zip(&self.size).try_fold(0, |index, ((cell, low), size)| {
+            let at = usize::try_from(cell - low).ok().filter(|at| at < size)?;
+            Some(index * size + at)
+        })
     }
 
     /// Whether something stands between two points, apart from what is around either.

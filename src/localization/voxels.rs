@@ -1,6 +1,6 @@
 //! A sparse voxel grid that counts distinct views (§3.1).
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::HashSet;
 
 use crate::math::Point;
 
@@ -16,21 +16,92 @@ pub fn center(voxel: &[i32; 3], voxel_m: f64) -> Point {
     Point::from(voxel.map(|i| (f64::from(i) + 0.5) * voxel_m))
 }
 
-/// Number of distinct views per voxel, `n_v`. `seen` lists (view, point), the points of one view together.
+/// Number of distinct views per voxel, `n_v`, by voxel. `seen` lists (view, point), the points of one view together.
 #[must_use]
-pub fn count_views(seen: &[(u32, Point)], voxel_m: f64) -> BTreeMap<[i32; 3], u32> {
-    let mut counts: HashMap<[i32; 3], (u32, u32)> = HashMap::new();
+pub fn count_views(seen: &[(u32, Point)], voxel_m: f64) -> Vec<([i32; 3], u32)> {
+    let mut table = Table::new();
+    let scale = 1.0 / voxel_m;
+    // Neighbours in an image fall into one voxel more often than not.
+    let (mut last_key, mut last_view) = (Table::EMPTY, u32::MAX);
     for (view, p) in seen {
-        counts
-            .entry(index(p, voxel_m))
-            .and_modify(|(last, n)| {
-                if *last != *view {
-                    (*last, *n) = (*view, *n + 1);
-                }
-            })
-            .or_insert((*view, 1));
+        let key = pack(p, scale);
+        if key == last_key && *view == last_view {
+            continue;
+        }
+        (last_key, last_view) = (key, *view);
+        table.count(key, *view);
     }
-    counts.into_iter().map(|(v, (_, n))| (v, n)).collect()
+    let mut counts: Vec<([i32; 3], u32)> =
+        table.slots.iter().filter(|s| s.key != Table::EMPTY).map(|s| (unpack(s.key), s.count)).collect();
+    counts.sort_unstable_by_key(|(voxel, _)| *voxel);
+    counts
+}
+
+/// Bits of a voxel's index along one axis, and its offset: 50 km to each side at 5 cm.
+const BITS: u32 = 21;
+const OFFSET: i64 = 1 << (BITS - 1);
+
+fn pack(p: &Point, scale: f64) -> u64 {
+    let axis = |c: f64| ((c * scale).floor() as i64 + OFFSET).clamp(0, (1 << BITS) - 1) as u64;
+    axis(p.x) << (2 * BITS) | axis(p.y) << BITS | axis(p.z)
+}
+
+fn unpack(key: u64) -> [i32; 3] {
+    [2 * BITS, BITS, 0].map(|shift| ((key >> shift & ((1 << BITS) - 1)) as i64 - OFFSET) as i32)
+}
+
+#[derive(Clone, Copy)]
+struct Slot {
+    key: u64,
+    last_view: u32,
+    count: u32,
+}
+
+/// Open addressing with linear probing: one line of cache a point.
+struct Table {
+    slots: Vec<Slot>,
+    used: usize,
+}
+
+impl Table {
+    const EMPTY: u64 = u64::MAX;
+
+    fn new() -> Self {
+        Self { slots: vec![Slot { key: Self::EMPTY, last_view: 0, count: 0 }; 1 << 14], used: 0 }
+    }
+
+    fn home(&self, key: u64) -> usize {
+        // Fibonacci hashing: the high bits of the product are mixed best.
+        (key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> (64 - self.slots.len().trailing_zeros())) as usize
+    }
+
+    fn slot(&mut self, key: u64) -> &mut Slot {
+        let mask = self.slots.len() - 1;
+        let mut at = self.home(key);
+        while self.slots[at].key != key && self.slots[at].key != Self::EMPTY {
+            at = (at + 1) & mask;
+        }
+        &mut self.slots[at]
+    }
+
+    fn count(&mut self, key: u64, view: u32) {
+        let slot = self.slot(key);
+        if slot.key == key {
+            if slot.last_view != view {
+                slot.last_view = view;
+                slot.count += 1;
+            }
+            return;
+        }
+        *slot = Slot { key, last_view: view, count: 1 };
+        self.used += 1;
+        if 2 * self.used > self.slots.len() {
+            let bigger = vec![Slot { key: Self::EMPTY, last_view: 0, count: 0 }; 2 * self.slots.len()];
+            for old in std::mem::replace(&mut self.slots, bigger).into_iter().filter(|s| s.key != Self::EMPTY) {
+                *self.slot(old.key) = old;
+            }
+        }
+    }
 }
 
 /// The voxels of the connected piece (26 neighbours) nearest to the grip, sorted; empty where none is within 20 cm of it.
@@ -75,8 +146,18 @@ mod tests {
         let p = Point::new(0.01, 0.01, 0.01);
         let q = Point::new(-0.01, 0.01, 0.01);
         let counts = count_views(&[(0, p), (0, p), (1, p), (1, q), (3, p)], 0.05);
-        assert_eq!(counts[&[0, 0, 0]], 3);
-        assert_eq!(counts[&[-1, 0, 0]], 1);
+        assert_eq!(counts, [([-1, 0, 0], 1), ([0, 0, 0], 3)]);
+    }
+
+    #[test]
+    fn a_hundred_thousand_voxels_far_from_the_origin_are_told_apart() {
+        let seen: Vec<(u32, Point)> = (0..100_000u32)
+            .map(|i| (i % 2, Point::new(-900.0 + 0.05 * f64::from(i % 300), 700.0, 0.05 * f64::from(i / 300) - 3.0)))
+            .map(|(v, p)| (v, p + crate::math::Vector::repeat(0.02)))
+            .collect();
+        let counts = count_views(&seen, 0.05);
+        assert_eq!(counts.len(), 100_000);
+        assert!(counts.iter().all(|(_, n)| *n == 1) && counts.is_sorted());
     }
 
     #[test]
