@@ -40,10 +40,16 @@ pub fn estimate(recording: &Recording, views: &[usize], config: &config::Geometr
             let all: Vec<Vector> =
                 by_view.iter().flat_map(|(view, normals)| normals.iter().map(|n| rotated(*view, n))).collect();
             let frames = by_view.iter().filter(|(_, normals)| !normals.is_empty()).count();
-            let start = heading(&all, &recording.up());
-            Ok(start.map(|start| ManhattanFrame { axes: refine(start, &all, &recording.up()), frames }))
+            Ok(of_normals(&all, &recording.up()).map(|axes| ManhattanFrame { axes, frames }))
         }
     }
+}
+
+/// The room's axes from unit normals in the world and its up direction (good to a few degrees), the upright axis last; `None`
+/// where there are next to no upright surfaces.
+#[must_use]
+pub fn of_normals(normals: &[Vector], up: &Vector) -> Option<[Vector; 3]> {
+    heading(normals, up).map(|start| refine(start, normals, up))
 }
 
 /// The frame about the vertical that most upright surfaces agree on; `None` where there are next to none.

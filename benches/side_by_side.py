@@ -1,0 +1,91 @@
+"""Our stages beside what people would otherwise run, on the same bytes, one core, in one session.
+
+    python3 benches/side_by_side.py PEERS [--python PYTHON] [--markdown FILE]
+
+PEERS is a folder of peer benchmarks (peer_voxel.py, ...): scripts that take --dump DIR, --peer all, --cores 1 and print a
+JSON line a peer. PYTHON is an interpreter that has what they need. Prints for each stage our time, every peer's, and
+the ratios; medians of the repetitions of either side.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+# Our bench, the peer's script with its size, and how many items of the peer's input ours works on (None: all).
+STAGES = [
+    ("voxel_views", ["peer_voxel.py"]),
+    ("voxel_views_10m", ["peer_voxel.py", "--points", "10000000"]),
+    ("view_select", ["peer_views.py"]),
+    ("view_select_100k", ["peer_views.py", "--frames", "100000"]),
+    ("lsd", ["peer_lsd.py"]),
+    ("lsd_456", ["peer_lsd.py", "--res", "456x256", "--views", "50"]),
+    ("kalman_rts", ["peer_kalman.py"]),
+    ("normals_manhattan", ["peer_normals.py", "--res", "456x256", "--views", "50", "--sample", "20000"]),
+    ("lines3d_ransac", ["peer_lines3d.py", "--part", "ransac", "--max-tracks", "30"]),
+]
+# Written by hand for this very stage, not libraries that people use.
+BY_HAND = {"numba", "numpy", "numpy_dense", "numba+fpsample", "numpy+fpsample"}
+
+
+def json_lines(text):
+    return [json.loads(line) for line in text.splitlines() if line.startswith("{")]
+
+
+def triad_bytes_per_s(python, peers):
+    out = subprocess.run([python, "peer_stream.py", "--peer", "triad", "--cores", "1"], cwd=peers, capture_output=True, text=True)
+    for row in json_lines(out.stdout):
+        return row["rate"]["value"] * 1e9
+    return None
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("peers", type=pathlib.Path)
+    parser.add_argument("--python", default=sys.executable)
+    parser.add_argument("--markdown", type=pathlib.Path)
+    parser.add_argument("--only", help="stages with this in their name")
+    args = parser.parse_args()
+    root = pathlib.Path(__file__).resolve().parent.parent
+    target = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", root / "target"))
+    stages = [s for s in STAGES if not args.only or args.only in s[0]]
+    band = triad_bytes_per_s(args.python, args.peers)
+    rows = []
+    with tempfile.TemporaryDirectory() as inputs:
+        for name, command in stages:
+            subprocess.run([args.python, *command, "--dump", os.path.join(inputs, name)], cwd=args.peers, check=True, capture_output=True)
+        env = dict(os.environ, PAWS_BENCH_INPUT=inputs, RAYON_NUM_THREADS="1")
+        for name, command in stages:
+            # The two take turns, so that both see the same machine.
+            subprocess.run(["cargo", "bench", "--bench", "stages", "--", "--exact", name], cwd=root, env=env, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            estimate = json.loads((target / "criterion" / name / "new" / "estimates.json").read_text())
+            ours = estimate["median"]["point_estimate"] * 1e-9
+            interval = [estimate["median"]["confidence_interval"][k] * 1e-9 for k in ("lower_bound", "upper_bound")]
+            out = subprocess.run([args.python, *command, "--peer", "all", "--cores", "1"], cwd=args.peers, capture_output=True, text=True)
+            peers = {r["peer"]: r for r in json_lines(out.stdout)}
+            if not peers:
+                sys.exit(f"{name}: no peer ran: {out.stderr[-400:]}")
+            library = min((r["seconds"] for p, r in peers.items() if p not in BY_HAND), default=None)
+            by_hand = min((r["seconds"] for p, r in peers.items() if p in BY_HAND), default=None)
+            work = next(iter(peers.values())).get("bound") or {}
+            bound = work["bytes"] / band if band and "bytes" in work else None
+            rows.append((name, ours, interval, library, by_hand, bound, peers))
+            print(f"{name}: ours {ours * 1e3:.2f} ms", file=sys.stderr)
+    header = ["stage", "ours, ms (95 %)", "best library / ours", "by hand (numba) / ours", "ours / bytes bound", "peers, ms"]
+    table = [header, ["---"] * len(header)]
+    ratio = lambda a, b: "-" if a is None or not b else f"{a / b:.1f}"
+    for name, ours, interval, library, by_hand, bound, peers in rows:
+        listed = ", ".join(f"{p} {r['seconds'] * 1e3:.1f}" for p, r in sorted(peers.items(), key=lambda x: x[1]["seconds"]))
+        spread = f"{ours * 1e3:.2f} ({interval[0] * 1e3:.2f}..{interval[1] * 1e3:.2f})"
+        table.append([name, spread, ratio(library, ours), ratio(by_hand, ours), ratio(ours, bound), listed])
+    text = "\n".join("| " + " | ".join(r) + " |" for r in table) + "\n"
+    print(text)
+    if args.markdown:
+        args.markdown.write_text(text)
+
+
+if __name__ == "__main__":
+    main()

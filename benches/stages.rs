@@ -1,0 +1,261 @@
+//! The steps that see most data, one thread each. `cargo bench` makes its own inputs; with `PAWS_BENCH_INPUT` set to a folder
+//! of .npy files it takes those (`benches/side_by_side.py` writes them, so that other programs run on the same bytes).
+
+#![allow(clippy::unwrap_used, missing_docs, reason = "a bench that cannot run should say so at once")]
+
+use std::hint::black_box;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use paws_twin::config::{self, Config};
+use paws_twin::geometry::{detector, manhattan, segments};
+use paws_twin::hands;
+use paws_twin::localization::{Region, views, voxels};
+use paws_twin::math::{Point, Pose, Vector, kalman};
+use paws_twin::recording::{Camera, DepthFactors, Frame, FrameFiles, Grid, Recording};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+/// One array of a stage's inputs, flat, with its shape; `None` where no folder is given.
+fn input<T: npyz::Deserialize>(stage: &str, name: &str) -> Option<(Vec<u64>, Vec<T>)> {
+    let path = PathBuf::from(std::env::var_os("PAWS_BENCH_INPUT")?).join(stage).join(format!("{name}.npy"));
+    if !path.is_file() {
+        return None;
+    }
+    let array = npyz::NpyFile::new(std::io::BufReader::new(std::fs::File::open(path).unwrap())).unwrap();
+    Some((array.shape().to_vec(), array.into_vec().unwrap()))
+}
+
+fn points(flat: &[f64]) -> Vec<Point> {
+    flat.chunks_exact(3).map(|c| Point::new(c[0], c[1], c[2])).collect()
+}
+
+fn stage(c: &mut Criterion, name: &str, mut run: impl FnMut()) {
+    c.bench_function(name, |b| b.iter(&mut run));
+}
+
+/// Distinct views of 5 cm voxels over a cloud.
+fn voxel_views(c: &mut Criterion) {
+    for (stage_name, count) in [("voxel_views", 1_000_000), ("voxel_views_10m", 10_000_000)] {
+        let seen: Vec<(u32, Point)> = match (input::<f32>(stage_name, "points"), input::<u16>(stage_name, "view")) {
+            (Some((_, p)), Some((_, v))) => {
+                let all = points(&p.into_iter().map(f64::from).collect::<Vec<_>>());
+                v.into_iter().map(u32::from).zip(all).collect()
+            }
+            // Walls of a room of 4 x 4 x 2.5 m.
+            _ => {
+                let mut rng = Pcg64Mcg::seed_from_u64(1);
+                (0..count)
+                    .map(|i| {
+                        let (a, b) = (rng.random_range(0.0..4.0), rng.random_range(0.0..2.5));
+                        let p = if i % 2 == 0 { Point::new(a, 0.0, b) } else { Point::new(0.0, a, b) };
+                        ((i * 50 / count) as u32, p)
+                    })
+                    .collect()
+            }
+        };
+        stage(c, stage_name, || {
+            black_box(voxels::count_views(black_box(&seen), 0.05));
+        });
+    }
+}
+
+/// Frames that see a front, then 50 of them spread over the camera's places.
+fn view_select(c: &mut Criterion) {
+    for (stage_name, count) in [("view_select", 6_000), ("view_select_100k", 100_000)] {
+        let poses: Vec<Pose> = match input::<f64>(stage_name, "poses") {
+            Some((_, p)) => p
+                .chunks_exact(16)
+                .map(|m| {
+                    let r = nalgebra::Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
+                    let turn = nalgebra::UnitQuaternion::from_matrix(&r);
+                    Pose::from_parts(Vector::new(m[3], m[7], m[11]).into(), turn)
+                })
+                .collect(),
+            None => {
+                let mut rng = Pcg64Mcg::seed_from_u64(2);
+                (0..count)
+                    .map(|_| {
+                        let eye = Vector::new(rng.random_range(0.0..4.0), rng.random_range(-2.5..-0.5), 1.6);
+                        let turn = nalgebra::UnitQuaternion::from_euler_angles(-1.9, 0.0, rng.random_range(-3.0..3.0));
+                        Pose::from_parts(eye.into(), turn)
+                    })
+                    .collect()
+            }
+        };
+        let centers = input::<f64>(stage_name, "voxels").map_or_else(
+            || (0..400).map(|i| Point::new(1.4 + 0.05 * f64::from(i % 20), 0.6, 0.1 + 0.05 * f64::from(i / 20))).collect(),
+            |(_, v)| points(&v),
+        );
+        let region = Region {
+            voxel_m: 0.05,
+            voxels: centers.iter().map(|p| voxels::index(p, 0.05)).collect(),
+            min_views: 4,
+            points: Vec::new(),
+            class: None,
+            local_frames: Vec::new(),
+            viewpoint: Point::origin(),
+            grip: Point::origin(),
+        };
+        let files = FrameFiles { rgb: Some(PathBuf::from("x")), ..Default::default() };
+        let frames = poses
+            .into_iter()
+            .enumerate()
+            .map(|(i, world_from_camera)| Frame { timestamp_secs: i as f64, world_from_camera, files: files.clone() })
+            .collect();
+        let recording = Recording {
+            name: String::new(),
+            dir: Path::new("").to_owned(),
+            camera: Camera { width: 1408, height: 1408, fx: 610.0, fy: 610.0, cx: 703.5, cy: 703.5 },
+            frames,
+            clips: Vec::new(),
+            hands: Vec::new(),
+            labels: Default::default(),
+            reconstruction: Vec::new(),
+            depth_factors: DepthFactors::default(),
+        };
+        let config = config::Localization { min_visible_share: 0.5, ..Default::default() };
+        stage(c, stage_name, || {
+            black_box(views::reselect(black_box(&recording), &region, None, &config));
+        });
+    }
+}
+
+/// Segments of images.
+fn lsd(c: &mut Criterion) {
+    for (stage_name, [width, height], count) in [("lsd", [1408, 1408], 2), ("lsd_456", [456, 256], 10)] {
+        let images: Vec<Grid<u8>> = match input::<u8>(stage_name, "gray") {
+            Some((shape, data)) => {
+                let (height, width) = (shape[1] as usize, shape[2] as usize);
+                data.chunks_exact(width * height).map(|d| Grid { width, height, data: d.to_vec() }).collect()
+            }
+            // Boards of many sizes with a camera's grain.
+            None => {
+                let mut rng = Pcg64Mcg::seed_from_u64(3);
+                (0..count)
+                    .map(|_| {
+                        let mut image = Grid::filled(width, height, 120u8);
+                        for _ in 0..60 {
+                            let (x, y) = (rng.random_range(0..width - 40), rng.random_range(0..height - 40));
+                            let (w, h) = (rng.random_range(20..width / 3), rng.random_range(20..height / 3));
+                            let value = rng.random_range(30..220u8);
+                            for row in y..(y + h).min(height) {
+                                image.data[row * width + x..row * width + (x + w).min(width)].fill(value);
+                            }
+                        }
+                        image.data.iter_mut().for_each(|v| *v = v.saturating_add(rng.random_range(0..6)));
+                        image
+                    })
+                    .collect()
+            }
+        };
+        stage(c, stage_name, || {
+            for image in &images {
+                black_box(detector::detect(black_box(image), 10.0));
+            }
+        });
+    }
+}
+
+/// 10,000 hand trajectories of 10 to 100 samples.
+fn kalman_rts(c: &mut Criterion) {
+    let clips: Vec<(Vec<f64>, Vec<Point>)> =
+        match (input::<f64>("kalman_rts", "t"), input::<f64>("kalman_rts", "z"), input::<i64>("kalman_rts", "off")) {
+            (Some((_, t)), Some((_, z)), Some((_, off))) => {
+                let z = points(&z);
+                off.windows(2)
+                    .map(|w| (w[0] as usize)..(w[1] as usize))
+                    .map(|r| (t[r.clone()].to_vec(), z[r].to_vec()))
+                    .collect()
+            }
+            _ => {
+                let mut rng = Pcg64Mcg::seed_from_u64(4);
+                (0..10_000)
+                    .map(|i| {
+                        let n = 10 + i % 91;
+                        let times = (0..n).map(|k| f64::from(k) / 30.0).collect();
+                        let mut grain = || rng.random_range(-0.03..0.03);
+                        let path = (0..n).map(|k| Point::new(0.01 * f64::from(k) + grain(), grain(), 1.0 + grain()));
+                        (times, path.collect())
+                    })
+                    .collect()
+            }
+        };
+    let filter = hands::filter(&Config::default().hands);
+    stage(c, "kalman_rts", || {
+        for (times, path) in &clips {
+            black_box(kalman::smooth(times, path, &filter));
+        }
+    });
+}
+
+/// The room's frame from a million normals.
+fn normals_manhattan(c: &mut Criterion) {
+    let normals: Vec<Vector> =
+        match (input::<f32>("normals_manhattan", "normal"), input::<f64>("normals_manhattan", "poses")) {
+            (Some((shape, n)), Some((_, poses))) => {
+                let per_view = (shape[1] * shape[2]) as usize;
+                let step = (n.len() / 3).div_ceil(1_000_000);
+                n.chunks_exact(3)
+                    .enumerate()
+                    .step_by(step)
+                    .map(|(i, v)| {
+                        let m = &poses[16 * (i / per_view)..];
+                        let r = nalgebra::Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
+                        r * Vector::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2]))
+                    })
+                    .collect()
+            }
+            _ => {
+                let mut rng = Pcg64Mcg::seed_from_u64(5);
+                (0..1_000_000)
+                    .map(|i| {
+                        let axis = [Vector::x(), Vector::y(), Vector::z()][i % 3];
+                        (axis + Vector::from_fn(|_, _| rng.random_range(-0.3..0.3))).normalize()
+                    })
+                    .collect()
+            }
+        };
+    stage(c, "normals_manhattan", || {
+        black_box(manhattan::of_normals(black_box(&normals), &Vector::z()));
+    });
+}
+
+/// LO-RANSAC lines through the points of tracks, two fifths of them wrong.
+fn lines3d_ransac(c: &mut Criterion) {
+    let tracks: Vec<Vec<Point>> = match (input::<f64>("lines3d_ransac", "points"), input::<i64>("lines3d_ransac", "off")) {
+        (Some((_, p)), Some((_, off))) => {
+            let all = points(&p);
+            off.windows(2).map(|w| all[w[0] as usize..w[1] as usize].to_vec()).collect()
+        }
+        _ => {
+            let mut rng = Pcg64Mcg::seed_from_u64(6);
+            (0..30)
+                .map(|_| {
+                    (0..920)
+                        .map(|i| {
+                            let mut grain = |s: f64| rng.random_range(-s..s);
+                            let off = if i % 5 < 2 { 0.5 } else { 0.01 };
+                            Point::new(grain(off), grain(off), 0.001 * f64::from(i))
+                        })
+                        .collect()
+                })
+                .collect()
+        }
+    };
+    // The peers draw up to 200 times.
+    let config = config::Geometry { line_draws: 200, ..Default::default() };
+    stage(c, "lines3d_ransac", || {
+        for (i, track) in tracks.iter().enumerate() {
+            black_box(segments::fit_segment(black_box(track), &config, i as u64));
+        }
+    });
+}
+
+criterion_group! {
+    name = stages;
+    config = Criterion::default().sample_size(10).measurement_time(Duration::from_secs(3)).warm_up_time(Duration::from_millis(500));
+    targets = voxel_views, view_select, lsd, kalman_rts, normals_manhattan, lines3d_ransac
+}
+criterion_main!(stages);
