@@ -60,6 +60,9 @@ pub struct AxisCandidate {
     pub length_m: f64,
     /// How far the hand's path has moved a hinge from where its source put it, in standard deviations of the source.
     pub shift: f64,
+    /// For lines: share of the views shown to a language model in which it took the line for a hinge; 0 without one.
+    #[serde(default)]
+    pub named: f64,
 }
 
 impl AxisSource {
@@ -118,6 +121,8 @@ pub struct Evidence<'a> {
     pub rect: Option<&'a Rect>,
     /// 3D lines at the region.
     pub tracks: &'a [LineTrack],
+    /// For each of them [`AxisCandidate::named`]; may be shorter.
+    pub named: &'a [f64],
     /// The room's frame.
     pub manhattan: Option<&'a ManhattanFrame>,
     /// The grip at the closed end.
@@ -161,8 +166,9 @@ pub fn outward(joint: Articulation, face: &Face, grip: &Point) -> Articulation {
 
 fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCandidate>) {
     let snap = config.snap_deg.to_radians();
+    let named = |i: usize| evidence.named.get(i).copied().unwrap_or(0.0);
     if let Some(face) = evidence.face {
-        for track in evidence.tracks {
+        for (i, track) in evidence.tracks.iter().enumerate() {
             let Some((direction, upright)) = snapped(face, &track.segment.line.direction, snap) else { continue };
             let [right, up, height] = face.coordinates(&track.segment.middle());
             // A hinge lies at its face: deeper or nearer lines are the carcass, the floor, other furniture.
@@ -176,6 +182,7 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
                 views: track.views.len(),
                 length_m: track.segment.length(),
                 shift: 0.0,
+                named: named(i),
             });
         }
         let edges = [
@@ -195,10 +202,11 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
                 views: 0,
                 length_m,
                 shift: 0.0,
+                named: 0.0,
             }));
         }
     } else {
-        for track in evidence.tracks {
+        for (i, track) in evidence.tracks.iter().enumerate() {
             let joint = Articulation {
                 kind: JointKind::Revolute,
                 axis: track.segment.line.direction,
@@ -211,6 +219,7 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
                 views: track.views.len(),
                 length_m: track.segment.length(),
                 shift: 0.0,
+                named: named(i),
             });
         }
     }
@@ -222,7 +231,15 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
         if let Some(joint) = arc_about(evidence.path, &direction) {
             let shift = evidence.face.map_or(0.0, |face| implausibility(face, &joint));
             let side = evidence.face.map(|face| side_at(face, &direction, &joint.origin));
-            out.push(AxisCandidate { joint, source: AxisSource::HandArc, side, views: 0, length_m: 0.0, shift });
+            out.push(AxisCandidate {
+                joint,
+                source: AxisSource::HandArc,
+                side,
+                views: 0,
+                length_m: 0.0,
+                shift,
+                named: 0.0,
+            });
         }
     }
 }
@@ -274,7 +291,7 @@ fn slides(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
     let origin = evidence.path.first().copied().unwrap_or(evidence.grip);
     let mut push = |axis: Vector, source: AxisSource| {
         let joint = Articulation { kind: JointKind::Prismatic, axis, origin };
-        out.push(AxisCandidate { joint, source, side: None, views: 0, length_m: 0.0, shift: 0.0 });
+        out.push(AxisCandidate { joint, source, side: None, views: 0, length_m: 0.0, shift: 0.0, named: 0.0 });
     };
     if let Some(face) = evidence.face.filter(|_| config.use_face_normal) {
         push(face.normal, AxisSource::FaceNormal);

@@ -13,6 +13,7 @@ use crate::hands::{self, Trajectory};
 use crate::inference;
 use crate::localization::{self, Region, views};
 use crate::math::Point;
+use crate::reasoning::words::{Sight, Words};
 use crate::reasoning::{PartShape, Question, Reasoner};
 use crate::recording::narration::{self, Reading};
 use crate::recording::{Clip, Recording};
@@ -69,6 +70,7 @@ pub(super) fn infer(
         lines: Vec::new(),
         face: None,
         part: None,
+        words: None,
         candidates: Vec::new(),
         answer: None,
         joint: Outcome::Abstained(located.reason.unwrap_or_default()),
@@ -78,6 +80,7 @@ pub(super) fn infer(
     let in_views: Vec<&LiftedSegment> =
         result.views.iter().filter_map(|v| lifted.get(v)).flat_map(|g| &g.segments).collect();
     result.lines = tracks::build(&in_views, region, &config.geometry, config.seed);
+    result.words = reasoner.words(&Sight { recording, clip, region, views: &result.views, lines: &result.lines })?;
     let surface = surface(region, &result.views, lifted, config.localization.reach_m);
     let around = face::Surroundings {
         surface: &surface,
@@ -99,6 +102,7 @@ pub(super) fn infer(
             face: result.face.as_ref(),
             rect: result.part.as_ref(),
             tracks: &result.lines,
+            named: &result.words.as_ref().map_or_else(Vec::new, |w: &Words| w.named(result.lines.len())),
             manhattan: room,
             grip: region.grip,
             path: &path,
@@ -119,6 +123,7 @@ pub(super) fn infer(
         .collect();
     let answer = reasoner.answer(&Question {
         reading: &located.reading,
+        words: result.words.as_ref(),
         path: &path,
         grip: region.grip,
         candidates: &result.candidates,
