@@ -184,7 +184,7 @@ impl Server {
 
     /// One HTTP request.
     fn send(&self, body: &[u8]) -> std::result::Result<String, Fault> {
-        let mut request = self.agent.post(&self.endpoint).header("content-type", "application/json");
+        let mut request = self.agent.post(self.endpoint.as_str()).header("content-type", "application/json");
         if let Some(key) = &self.key {
             request = request.header("authorization", key.header.clone());
         }
