@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock, Mutex};
 use std::time::{Duration, Instant};
@@ -28,7 +28,7 @@ use paws_twin::vlm::{Model, Picture, Question, Sampling, Usage};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use crate::common::{SMALL, copy, record, stderr, tree};
+use crate::common::{SMALL, copy, python, record, stderr, tree};
 
 /// A request as the server got it.
 struct Got {
@@ -422,6 +422,49 @@ fn what_cannot_be_asked_is_told_at_once() {
         assert!(stderr(&out).contains(word) && !stderr(&out).contains(KEY), "{more:?}: {}", stderr(&out));
         let left: Vec<_> = std::fs::read_dir(dir.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
         assert_eq!(left, ["rec"], "{more:?}");
+    }
+}
+
+/// A process that ends with the test.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+fn a_real_server_answers_about_real_pictures() {
+    let Some(python) = python("words") else { return };
+    let dir = tempfile::tempdir().unwrap();
+    copy(SMALL.path(), &dir.path().join("rec"));
+    let log = dir.path().join("server.log");
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/words/tiny_server.py");
+    let mut server = Running(
+        Command::new(python)
+            .arg(script)
+            .arg(dir.path().join("model"))
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(std::fs::File::create(&log).unwrap())
+            .spawn()
+            .unwrap(),
+    );
+    let mut lines = BufReader::new(server.0.stdout.take().unwrap()).lines();
+    let (send, receive) = std::sync::mpsc::channel();
+    std::thread::spawn(move || send.send(lines.next()));
+    let url = match receive.recv_timeout(Duration::from_secs(120)) {
+        Ok(Some(Ok(url))) => url,
+        other => panic!("the server did not start ({other:?}): {}", std::fs::read_to_string(&log).unwrap()),
+    };
+    let out = paws(&["twin", "rec", "--out", "t", "--vlm-url", &url, "--vlm-model", "tiny"], dir.path());
+    assert_ne!(out.status.code(), Some(2), "{}", stderr(&out));
+    assert!(stderr(&out).contains("tiny: ") && !stderr(&out).contains("without an answer"), "{}", stderr(&out));
+    let articulations = std::fs::read_to_string(dir.path().join("t/articulations.json")).unwrap();
+    for word in ["\"revolute\": 10", "\"summary\": \"revolute\"", "\"furniture\": \"cupboard\""] {
+        assert!(articulations.contains(word), "{word}: {articulations}");
     }
 }
 
