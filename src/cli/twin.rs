@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use anyhow::bail;
 use clap::Args;
 
 use super::output::{Kind, Output};
@@ -100,6 +101,15 @@ pub fn make(
     asked: Option<&Asked>,
 ) -> anyhow::Result<Answer> {
     let begin = Instant::now();
+    if let Some(answers) = asked.and_then(Asked::answers)
+        && std::path::absolute(answers)?.starts_with(std::path::absolute(out)?)
+    {
+        bail!(
+            "{}: answers kept there would go when {} is replaced; choose another --answers",
+            shown(answers),
+            shown(out)
+        );
+    }
     let output = Output::new(out, Kind::Twin, &[recording])?;
     let recording = Recording::open(recording)?;
     let steps = Steps::new();

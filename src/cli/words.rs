@@ -1,6 +1,6 @@
 //! `--vlm-url` and what goes with it: a language model's words about the pictures.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
@@ -125,6 +125,11 @@ impl Asked {
     /// The model's name.
     pub fn model(&self) -> &str {
         self.base.name()
+    }
+
+    /// The folder of answers, where it is not the recording's own.
+    pub fn answers(&self) -> Option<&Path> {
+        self.answers.as_deref()
     }
 
     /// Whether nothing is to be asked or written.

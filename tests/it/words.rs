@@ -411,6 +411,7 @@ fn what_cannot_be_asked_is_told_at_once() {
         (vec!["--vlm-url", "127.0.0.1", "--vlm-model", "m"], "http://"),
         (vec!["--vlm-model", "m"], "--vlm-url"),
         (vec!["--vlm-model", "m", "--replay", "--templates", "rec"], "axis_choice.txt"),
+        (vec!["--vlm-model", "m", "--replay", "--answers", "t/answers"], "--answers"),
     ];
     if cfg!(not(feature = "vlm-https")) {
         cases.push((vec!["--vlm-url", https, "--vlm-model", "m"], "vlm-https"));
