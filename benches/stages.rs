@@ -85,7 +85,11 @@ fn view_select(c: &mut Criterion) {
             }
         };
         let centers = input::<f64>(stage_name, "voxels").map_or_else(
-            || (0..400).map(|i| Point::new(1.4 + 0.05 * f64::from(i % 20), 0.6, 0.1 + 0.05 * f64::from(i / 20))).collect(),
+            || {
+                (0..400)
+                    .map(|i| Point::new(1.4 + 0.05 * f64::from(i % 20), 0.6, 0.1 + 0.05 * f64::from(i / 20)))
+                    .collect()
+            },
             |(_, v)| points(&v),
         );
         let region = Region {
@@ -224,26 +228,27 @@ fn normals_manhattan(c: &mut Criterion) {
 
 /// LO-RANSAC lines through the points of tracks, two fifths of them wrong.
 fn lines3d_ransac(c: &mut Criterion) {
-    let tracks: Vec<Vec<Point>> = match (input::<f64>("lines3d_ransac", "points"), input::<i64>("lines3d_ransac", "off")) {
-        (Some((_, p)), Some((_, off))) => {
-            let all = points(&p);
-            off.windows(2).map(|w| all[w[0] as usize..w[1] as usize].to_vec()).collect()
-        }
-        _ => {
-            let mut rng = Pcg64Mcg::seed_from_u64(6);
-            (0..30)
-                .map(|_| {
-                    (0..920)
-                        .map(|i| {
-                            let mut grain = |s: f64| rng.random_range(-s..s);
-                            let off = if i % 5 < 2 { 0.5 } else { 0.01 };
-                            Point::new(grain(off), grain(off), 0.001 * f64::from(i))
-                        })
-                        .collect()
-                })
-                .collect()
-        }
-    };
+    let tracks: Vec<Vec<Point>> =
+        match (input::<f64>("lines3d_ransac", "points"), input::<i64>("lines3d_ransac", "off")) {
+            (Some((_, p)), Some((_, off))) => {
+                let all = points(&p);
+                off.windows(2).map(|w| all[w[0] as usize..w[1] as usize].to_vec()).collect()
+            }
+            _ => {
+                let mut rng = Pcg64Mcg::seed_from_u64(6);
+                (0..30)
+                    .map(|_| {
+                        (0..920)
+                            .map(|i| {
+                                let mut grain = |s: f64| rng.random_range(-s..s);
+                                let off = if i % 5 < 2 { 0.5 } else { 0.01 };
+                                Point::new(grain(off), grain(off), 0.001 * f64::from(i))
+                            })
+                            .collect()
+                    })
+                    .collect()
+            }
+        };
     // The peers draw up to 200 times.
     let config = config::Geometry { line_draws: 200, ..Default::default() };
     stage(c, "lines3d_ransac", || {

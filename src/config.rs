@@ -173,10 +173,16 @@ block! {
         vlm_frames: usize = 10, "frames", "B.1";
         /// Longest projected lines per view offered to a language model (the geometric heuristic weighs all).
         vlm_lines_per_view: usize = 4, "lines", "B.1";
+        /// Global views in which a language model is asked for the hinge; fewer cost less.
+        vlm_views: usize = 50, "views", "A.6";
         /// Sampling temperature of a language model.
         vlm_temperature: f64 = 0.5, "-", "B.1";
         /// Nucleus of a language model.
         vlm_top_p: f64 = 0.3, "-", "B.1";
+        /// Longest answer of a language model; one that thinks aloud needs more.
+        vlm_max_tokens: usize = 300, "tokens", "ours";
+        /// How often a language model tells the motion type rightly.
+        vlm_accuracy: f64 = 0.9, "share", "ours";
         /// How often the furniture's name tells the motion type rightly.
         name_accuracy: f64 = 0.9, "share", "ours";
         /// Independent samples in one recorded motion: errors of neighbouring frames are correlated.
@@ -362,7 +368,12 @@ impl Config {
     fn check(&self) -> std::result::Result<(), String> {
         for row in self.rows() {
             let Ok(value) = row.value.parse::<f64>() else { continue };
-            let zero_is_fine = ["hands.restart_after", "hands.widen_secs", "localization.min_visible_share"];
+            let zero_is_fine = [
+                "hands.restart_after",
+                "hands.widen_secs",
+                "localization.min_visible_share",
+                "reasoning.vlm_temperature",
+            ];
             if !value.is_finite() || value < 0.0 || (value == 0.0 && !zero_is_fine.contains(&row.key.as_str())) {
                 return Err(format!("{} = {} must be a positive finite number ({})", row.key, row.value, row.unit));
             }
@@ -404,7 +415,9 @@ fn sensible(row: &Row) -> [f64; 2] {
         (_, "m") => [1e-4, 100.0],
         (_, "s") => [1e-3, 100.0],
         (_, "deg") => [1e-2, 180.0],
+        ("reasoning.vlm_lines_per_view", _) => [1.0, 9.0],
         (_, "px" | "frames" | "views" | "samples" | "lines") => [1.0, 1e4],
+        (_, "tokens") => [1.0, 1e5],
         ("geometry.normals_per_frame", _) => [100.0, 1e6],
         (_, "-") => [1e-3, 1e4],
         _ => [1e-6, 1e6],

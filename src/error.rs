@@ -41,6 +41,9 @@ pub enum Error {
     /// The physics simulation gave no usable result.
     #[error("simulation: {0}")]
     Simulation(String),
+    /// A language model that cannot be asked at all: a bad address, a refused key. A failed answer is not an error.
+    #[error("language model: {0}")]
+    Vlm(String),
 }
 
 /// Result with this crate's [`Error`].

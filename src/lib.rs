@@ -22,7 +22,7 @@
 //! | `P_n`, camera to world | [`recording::Frame::world_from_camera`] |
 //! | `L_2D`, `L_3D` | [`geometry::segments`], [`geometry::LineTrack`] |
 //! | `m_1, m_2, m_3` | [`geometry::ManhattanFrame`] |
-//! | `c_i`, `L*` | [`reasoning::Answer`] |
+//! | `c_i`, `L*` | [`reasoning::Answer`], [`reasoning::words::Words`] |
 //! | `phi = {c, a, o}` | [`articulation::Articulation`] |
 //!
 //! Every pose is `target_from_source`; everything is metric, right-handed, in radians and seconds, `f64`.
@@ -35,6 +35,7 @@ pub mod json;
 pub mod math;
 pub mod recording;
 pub mod twin;
+pub mod vlm;
 
 pub mod synth;
 

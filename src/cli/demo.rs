@@ -22,5 +22,5 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Answer> {
     eprintln!("rendering a recording of a kitchen into {} ...", recording.display());
     super::synth::write(&crate::synth::Options { seed: SEED, width: 480, parts: 6, ..Default::default() }, &recording)?;
     eprintln!("making its twin ...");
-    twin::make(&recording, &twin, &Config::default(), true)
+    twin::make(&recording, &twin, &Config::default(), true, None)
 }

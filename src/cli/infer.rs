@@ -7,17 +7,17 @@ use clap::Args;
 
 use super::output::write_file;
 use super::progress::Steps;
+use super::words::{self as model, Asked, WordsArgs};
 use super::{Answer, ConfigFile, print, shown};
 use crate::articulation::Outcome;
 use crate::config::Config;
 use crate::evaluation::Predictions;
-use crate::geometry::segments::Lsd;
 use crate::inference::bare;
 use crate::json;
-use crate::pipeline;
 use crate::recording::{Recording, trajectory};
 use crate::report::table::aligned;
 use crate::report::{files, words};
+use crate::vlm::Usage;
 
 #[derive(Debug, Args)]
 pub struct InferArgs {
@@ -29,6 +29,8 @@ pub struct InferArgs {
     out: Option<PathBuf>,
     #[command(flatten)]
     config: ConfigFile,
+    #[command(flatten)]
+    words: WordsArgs,
 }
 
 pub fn run(args: &InferArgs) -> anyhow::Result<Answer> {
@@ -40,20 +42,29 @@ pub fn run(args: &InferArgs) -> anyhow::Result<Answer> {
     if folders.is_empty() {
         bare_trajectories(&trajectories, &config, args.out.as_deref())
     } else {
-        recordings(&folders, &config, args.out.as_deref())
+        recordings(&folders, &config, args.words.open()?.as_ref(), args.out.as_deref())
     }
 }
 
-fn recordings(folders: &[&PathBuf], config: &Config, out: Option<&Path>) -> anyhow::Result<Answer> {
+fn recordings(
+    folders: &[&PathBuf],
+    config: &Config,
+    asked: Option<&Asked>,
+    out: Option<&Path>,
+) -> anyhow::Result<Answer> {
     let mut all = Predictions::default();
     let header = ["recording", "clip", "narration", "joint", "outcome"];
     let mut rows = vec![header.map(str::to_owned).to_vec()];
     // All are opened before the first is worked on: one that cannot be read is told at once.
     let opened: Vec<Recording> = folders.iter().map(|f| Recording::open(f)).collect::<Result<_, _>>()?;
+    if let Some(asked) = asked.filter(|a| a.is_dry()) {
+        return asked.count(&opened, config);
+    }
+    let mut total: Option<Usage> = None;
     for recording in &opened {
         let steps = Steps::new();
-        let reasoner = super::twin::reasoner(config);
-        let scene = pipeline::infer(recording, config, &Lsd, &reasoner, &|s, d, t| steps.report(s, d, t))?;
+        let model::Inferred { scene, usage, .. } = model::infer(recording, config, asked, &steps, false)?;
+        total = model::added(total, usage);
         let twin = crate::fitting::fit(&scene, &recording.up(), &config.fitting);
         steps.finish();
         for c in &scene.clips {
@@ -72,6 +83,9 @@ fn recordings(folders: &[&PathBuf], config: &Config, out: Option<&Path>) -> anyh
     if let Some(out) = out {
         write_file(out, json::text(&all)?)?;
         eprintln!("predictions: {}", shown(out));
+    }
+    if let Some((asked, usage)) = asked.zip(total) {
+        eprintln!("{}", usage.sentence(asked.model()));
     }
     let found = all.predictions.iter().any(|p| p.kind.is_some());
     Ok(if found { Answer::Yes } else { Answer::No })

@@ -6,13 +6,20 @@ use anyhow::Context;
 use image::{Rgb, RgbImage};
 
 use super::output::Output;
+use super::words::Exchange;
 use crate::json;
 use crate::math::Point;
 use crate::pipeline::{ClipResult, Scene};
 use crate::recording::{Camera, Recording};
 use crate::twin::Twin;
 
-pub fn write(recording: &Recording, scene: &Scene, twin: &Twin, output: &Output) -> anyhow::Result<()> {
+pub fn write(
+    recording: &Recording,
+    scene: &Scene,
+    twin: &Twin,
+    exchanges: &[Exchange],
+    output: &Output,
+) -> anyhow::Result<()> {
     for clip in &scene.clips {
         // A clip's name may be anything; a folder's may not.
         let name: String = clip
@@ -57,6 +64,14 @@ pub fn write(recording: &Recording, scene: &Scene, twin: &Twin, output: &Output)
                 writeln!(text, "l {} {}", 2 * i + 1, 2 * i + 2)?;
             }
             output.write(&format!("{folder}/lines.obj"), text)?;
+        }
+        for exchange in exchanges.iter().filter(|e| e.clip() == clip.clip.clip) {
+            let name = format!("{folder}/vlm/{}", exchange.name());
+            let answer = exchange.answer.as_deref().unwrap_or("(none)");
+            output.write(&format!("{name}.txt"), format!("{}\n--- answer ---\n{answer}\n", exchange.question.text))?;
+            if let Some(picture) = exchange.question.pictures.first() {
+                output.write(&format!("{name}.jpg"), &picture.bytes)?;
+            }
         }
         marked_image(recording, scene, clip, twin, output, &folder)?;
     }

@@ -12,6 +12,7 @@ use crate::geometry::segments::Lsd;
 use crate::json;
 use crate::math::stats;
 use crate::pipeline;
+use crate::reasoning::heuristic::Geometric;
 use crate::recording::Recording;
 use crate::report::table::aligned;
 
@@ -41,7 +42,7 @@ pub fn run(args: &MeasureArgs) -> anyhow::Result<Answer> {
     let steps = Steps::new();
     for (i, (recording, truth)) in opened.iter().enumerate() {
         steps.report("measuring", i, opened.len());
-        let reasoner = super::twin::reasoner(&config);
+        let reasoner = Geometric { reasoning: config.reasoning.clone(), inference: config.inference.clone() };
         let scene = pipeline::infer(recording, &config, &Lsd, &reasoner, &|_, _, _| {})?;
         let stages = measure(&scene, truth);
         if args.each {

@@ -14,6 +14,7 @@ mod progress;
 mod synth;
 mod twin;
 mod validate;
+mod words;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

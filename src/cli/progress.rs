@@ -17,7 +17,7 @@ impl Steps {
     /// A bar that is hidden where standard error is no terminal.
     pub fn new() -> Self {
         let bar = ProgressBar::new(1);
-        if let Ok(style) = ProgressStyle::with_template("{msg:>14} {wide_bar} {pos}/{len} {elapsed}") {
+        if let Ok(style) = ProgressStyle::with_template("{msg:>14} {wide_bar} {pos}/{len} {elapsed} {prefix}") {
             bar.set_style(style);
         }
         Self {
@@ -39,6 +39,11 @@ impl Steps {
         }
         self.bar.set_length(total as u64);
         self.bar.set_position(done as u64);
+    }
+
+    /// Something that changes while a step goes on, behind the bar.
+    pub fn note(&self, text: String) {
+        self.bar.set_prefix(text);
     }
 
     fn close(&self, step: &str) {

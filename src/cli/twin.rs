@@ -3,18 +3,17 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use anyhow::bail;
 use clap::Args;
 
 use super::output::{Kind, Output};
 use super::progress::Steps;
+use super::words::{self as model, Asked, WordsArgs};
 use super::{Answer, ConfigFile, keep, print, shown};
 use crate::config::Config;
-use crate::geometry::segments::Lsd;
 use crate::hands::Trajectory;
 use crate::json;
 use crate::pipeline::{self, Scene};
-use crate::reasoning::Reasoner;
-use crate::reasoning::heuristic::Geometric;
 use crate::recording::Recording;
 use crate::report::page::FileNote;
 use crate::report::table::aligned;
@@ -32,9 +31,12 @@ pub struct TwinArgs {
     out: PathBuf,
     #[command(flatten)]
     config: ConfigFile,
-    /// Keep every intermediate result (trajectories, voxels, lines, candidates, marked images) in DIR/steps
+    /// Keep every intermediate result (trajectories, voxels, lines, candidates, marked images, questions to a language
+    /// model) in DIR/steps
     #[arg(long)]
     keep: bool,
+    #[command(flatten)]
+    words: WordsArgs,
 }
 
 const FILES: [FileNote; 11] = [
@@ -52,7 +54,11 @@ const FILES: [FileNote; 11] = [
 ];
 
 pub fn run(args: &TwinArgs) -> anyhow::Result<Answer> {
-    make(&args.recording, &args.out, &args.config.read()?, args.keep)
+    let (config, asked) = (args.config.read()?, args.words.open()?);
+    if let Some(asked) = asked.as_ref().filter(|a| a.is_dry()) {
+        return asked.count(&[Recording::open(&args.recording)?], &config);
+    }
+    make(&args.recording, &args.out, &config, args.keep, asked.as_ref())
 }
 
 /// A joint's recorded hands, as `trajectories.json` has them.
@@ -87,18 +93,28 @@ pub fn as_hands(joints: &[JointHands]) -> Vec<Hands<'_>> {
     joints.iter().map(|j| j.clips.iter().map(|(name, t)| (name.clone(), t)).collect()).collect()
 }
 
-/// The reasoner that needs no network.
-pub fn reasoner(config: &Config) -> Geometric {
-    Geometric { reasoning: config.reasoning.clone(), inference: config.inference.clone() }
-}
-
-pub fn make(recording: &Path, out: &Path, config: &Config, keep_steps: bool) -> anyhow::Result<Answer> {
+pub fn make(
+    recording: &Path,
+    out: &Path,
+    config: &Config,
+    keep_steps: bool,
+    asked: Option<&Asked>,
+) -> anyhow::Result<Answer> {
     let begin = Instant::now();
+    if let Some(answers) = asked.and_then(Asked::answers)
+        && std::path::absolute(answers)?.starts_with(std::path::absolute(out)?)
+    {
+        bail!(
+            "{}: answers kept there would go when {} is replaced; choose another --answers",
+            shown(answers),
+            shown(out)
+        );
+    }
     let output = Output::new(out, Kind::Twin, &[recording])?;
     let recording = Recording::open(recording)?;
     let steps = Steps::new();
-    let reasoner = reasoner(config);
-    let scene = pipeline::infer(&recording, config, &Lsd, &reasoner, &|s, d, t| steps.report(s, d, t))?;
+    let model::Inferred { scene, reasoner, usage, exchanges } =
+        model::infer(&recording, config, asked, &steps, keep_steps)?;
     steps.report("fitting boxes", 0, 1);
     let twin = fitting::fit(&scene, &recording.up(), &config.fitting);
     steps.report("simulating", 0, 1);
@@ -112,7 +128,7 @@ pub fn make(recording: &Path, out: &Path, config: &Config, keep_steps: bool) -> 
     output.write("scene.urdf", export::urdf::write(&twin)?)?;
     output.write("scene.xml", export::mjcf::write(&twin)?)?;
     output.write("scene.glb", &glb)?;
-    output.write("articulations.json", files::articulations(&scene, reasoner.name())?)?;
+    output.write("articulations.json", files::articulations(&scene, &reasoner)?)?;
     output.write("predictions.json", json::text(&files::predictions(&scene, &twin))?)?;
     output.write("twin.json", json::text(&twin)?)?;
     output.write("validation.json", json::text(&validation)?)?;
@@ -122,13 +138,16 @@ pub fn make(recording: &Path, out: &Path, config: &Config, keep_steps: bool) -> 
     let notes: Vec<FileNote> = FILES.iter().filter(|f| keep_steps || f.name != "steps/").cloned().collect();
     output.write("index.html", page::render(&scene, &twin, &validation, &glb, &command, &notes)?)?;
     if keep_steps {
-        keep::write(&recording, &scene, &twin, &output)?;
+        keep::write(&recording, &scene, &twin, &exchanges, &output)?;
     }
     output.finish()?;
     let times = steps.finish();
 
     print(&summary(&scene, &twin, &validation))?;
     let times: Vec<String> = times.iter().map(|(s, t)| format!("{s} {:.2} s", t.as_secs_f64())).collect();
+    if let Some((asked, usage)) = asked.zip(usage) {
+        eprintln!("{}", usage.sentence(asked.model()));
+    }
     eprintln!("{:.2} s ({})", begin.elapsed().as_secs_f64(), times.join(", "));
     print(&format!(
         "\nlook:  {}   (the scene in 3D, every verdict with its reason)\n",

@@ -64,6 +64,31 @@ pub struct AxisCandidate {
     pub position_std_m: f64,
     /// How far the hand's path has moved a hinge from where its source put it, in standard deviations of the source.
     pub shift: f64,
+    /// For lines: share of the views shown to a language model in which it took the line for a hinge; 0 without one.
+    #[serde(default)]
+    pub named: f64,
+}
+
+impl AxisCandidate {
+    /// A candidate of which no more is known than its joint and where it comes from.
+    #[must_use]
+    pub fn new(joint: Articulation, source: AxisSource) -> Self {
+        let position_std_m = source.position_std_m();
+        Self { joint, source, side: None, views: 0, length_m: 0.0, position_std_m, shift: 0.0, named: 0.0 }
+    }
+
+    /// A hinge at a 3D line.
+    fn at_line(track: &LineTrack, direction: Vector, named: f64) -> Self {
+        let joint = Articulation { kind: JointKind::Revolute, axis: direction, origin: track.segment.middle() };
+        let source = AxisSource::Line;
+        Self {
+            views: track.views.len(),
+            length_m: track.segment.length(),
+            position_std_m: source.position_std_m().hypot(track.position_std_m()),
+            named,
+            ..Self::new(joint, source)
+        }
+    }
 }
 
 impl AxisSource {
@@ -124,6 +149,8 @@ pub struct Evidence<'a> {
     pub tracks: &'a [LineTrack],
     /// Points of the touched furniture, world.
     pub surface: &'a [Point],
+    /// For each of them [`AxisCandidate::named`]; may be shorter.
+    pub named: &'a [f64],
     /// The room's frame.
     pub manhattan: Option<&'a ManhattanFrame>,
     /// The grip at the closed end.
@@ -167,77 +194,45 @@ pub fn outward(joint: Articulation, face: &Face, grip: &Point) -> Articulation {
 
 fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCandidate>) {
     let snap = config.snap_deg.to_radians();
+    let named = |i: usize| evidence.named.get(i).copied().unwrap_or(0.0);
     if let Some(face) = evidence.face {
-        for track in evidence.tracks {
+        for (i, track) in evidence.tracks.iter().enumerate() {
             let Some((direction, upright)) = snapped(face, &track.segment.line.direction, snap) else { continue };
             let [right, up, height] = face.coordinates(&track.segment.middle());
             // A hinge lies at its face: deeper or nearer lines are the carcass, the floor, other furniture.
-            if height.abs() > 0.08 {
-                continue;
+            if height.abs() <= 0.08 {
+                let side = Some(side_of(if upright { right } else { up }, upright));
+                out.push(AxisCandidate { side, ..AxisCandidate::at_line(track, direction, named(i)) });
             }
-            out.push(AxisCandidate {
-                joint: Articulation { kind: JointKind::Revolute, axis: direction, origin: track.segment.middle() },
-                source: AxisSource::Line,
-                side: Some(side_of(if upright { right } else { up }, upright)),
-                views: track.views.len(),
-                length_m: track.segment.length(),
-                position_std_m: AxisSource::Line.position_std_m().hypot(track.position_std_m()),
-                shift: 0.0,
-            });
         }
+        // An edge of the face: 0 = upright or 1 = level, its offset across and its middle along, its length.
+        let mut edge = |axis: usize, offset: f64, middle: f64, length_m: f64, source: AxisSource| {
+            let (axis, origin, upright) = match axis {
+                0 => (face.up, face.point(offset, middle, 0.0), true),
+                _ => (face.right, face.point(middle, offset, 0.0), false),
+            };
+            let joint = Articulation { kind: JointKind::Revolute, axis, origin };
+            let side = Some(side_of(offset, upright));
+            out.push(AxisCandidate { side, length_m, ..AxisCandidate::new(joint, source) });
+        };
+        let middles = |rect: &Rect| rect.bounds.map(|b| 0.5 * (b[0] + b[1]));
+        let around_part = evidence.rect.map_or([0.0; 2], middles);
         for (axis, offset, length_m) in plane_edges(face, evidence.surface) {
-            let upright = axis == 0;
-            let source = AxisSource::PlaneEdge;
-            let middle = evidence.rect.map_or([0.0; 2], |r| r.bounds.map(|b| 0.5 * (b[0] + b[1])));
-            let origin = if upright { face.point(offset, middle[1], 0.0) } else { face.point(middle[0], offset, 0.0) };
-            let axis = if upright { face.up } else { face.right };
-            out.push(AxisCandidate {
-                joint: Articulation { kind: JointKind::Revolute, axis, origin },
-                source,
-                side: Some(side_of(offset, upright)),
-                views: 0,
-                length_m,
-                position_std_m: source.position_std_m(),
-                shift: 0.0,
-            });
+            edge(axis, offset, around_part[1 - axis], length_m, AxisSource::PlaneEdge);
         }
-        let edges = [
-            (evidence.rect.copied(), AxisSource::PartEdge),
-            (Some(Rect { bounds: face.extent }), AxisSource::FaceEdge),
-        ];
-        for (rect, source) in edges {
-            let Some(rect) = rect else { continue };
-            let middle = rect.bounds.map(|b| 0.5 * (b[0] + b[1]));
-            let size = rect.size();
-            let upright = rect.bounds[0].map(|r| (face.up, face.point(r, middle[1], 0.0), side_of(r, true), size[1]));
-            let level = rect.bounds[1].map(|u| (face.right, face.point(middle[0], u, 0.0), side_of(u, false), size[0]));
-            out.extend(upright.into_iter().chain(level).map(|(axis, origin, side, length_m)| AxisCandidate {
-                joint: Articulation { kind: JointKind::Revolute, axis, origin },
-                source,
-                side: Some(side),
-                views: 0,
-                length_m,
-                position_std_m: source.position_std_m(),
-                shift: 0.0,
-            }));
+        let whole = Rect { bounds: face.extent };
+        for (rect, source) in
+            evidence.rect.map(|r| (r, AxisSource::PartEdge)).into_iter().chain([(&whole, AxisSource::FaceEdge)])
+        {
+            for axis in [0, 1] {
+                for offset in rect.bounds[axis] {
+                    edge(axis, offset, middles(rect)[1 - axis], rect.size()[1 - axis], source);
+                }
+            }
         }
     } else {
-        for track in evidence.tracks {
-            let joint = Articulation {
-                kind: JointKind::Revolute,
-                axis: track.segment.line.direction,
-                origin: track.segment.middle(),
-            };
-            out.push(AxisCandidate {
-                joint,
-                source: AxisSource::Line,
-                side: None,
-                views: track.views.len(),
-                length_m: track.segment.length(),
-                position_std_m: AxisSource::Line.position_std_m().hypot(track.position_std_m()),
-                shift: 0.0,
-            });
-        }
+        let lines = evidence.tracks.iter().enumerate();
+        out.extend(lines.map(|(i, t)| AxisCandidate::at_line(t, t.segment.line.direction, named(i))));
     }
     let directions: Vec<Vector> = match evidence.face {
         Some(face) => vec![face.up, face.right],
@@ -247,9 +242,7 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
         if let Some(joint) = arc_about(evidence.path, &direction) {
             let shift = evidence.face.map_or(0.0, |face| implausibility(face, &joint));
             let side = evidence.face.map(|face| side_at(face, &direction, &joint.origin));
-            let source = AxisSource::HandArc;
-            let position_std_m = source.position_std_m();
-            out.push(AxisCandidate { joint, source, side, views: 0, length_m: 0.0, position_std_m, shift });
+            out.push(AxisCandidate { side, shift, ..AxisCandidate::new(joint, AxisSource::HandArc) });
         }
     }
 }
@@ -337,8 +330,7 @@ fn slides(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
     let origin = evidence.path.first().copied().unwrap_or(evidence.grip);
     let mut push = |axis: Vector, source: AxisSource| {
         let joint = Articulation { kind: JointKind::Prismatic, axis, origin };
-        let position_std_m = source.position_std_m();
-        out.push(AxisCandidate { joint, source, side: None, views: 0, length_m: 0.0, position_std_m, shift: 0.0 });
+        out.push(AxisCandidate::new(joint, source));
     };
     if let Some(face) = evidence.face.filter(|_| config.use_face_normal) {
         push(face.normal, AxisSource::FaceNormal);

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::{ClipResult, Looks};
 use crate::articulation::Outcome;
 use crate::config::{Config, LineMethod};
+use crate::error::Result;
 use crate::geometry::moved::{self, Rect};
 use crate::geometry::segments::LiftedSegment;
 use crate::geometry::{Face, LineTrack, ManhattanFrame, candidates, face, tracks};
@@ -12,6 +13,7 @@ use crate::hands::{self, Trajectory};
 use crate::inference;
 use crate::localization::{self, Region, views};
 use crate::math::Point;
+use crate::reasoning::words::{Sight, Words};
 use crate::reasoning::{PartShape, Question, Reasoner};
 use crate::recording::narration::{self, Reading};
 use crate::recording::sketch::Sketch;
@@ -96,7 +98,7 @@ pub(super) fn infer(
     seen: &Seen,
     reasoner: &dyn Reasoner,
     config: &Config,
-) -> ClipResult {
+) -> Result<ClipResult> {
     let mut result = ClipResult {
         clip: clip.clone(),
         trajectory: located.trajectory,
@@ -105,11 +107,12 @@ pub(super) fn infer(
         lines: Vec::new(),
         face: None,
         part: None,
+        words: None,
         candidates: Vec::new(),
         answer: None,
         joint: Outcome::Abstained(located.reason.unwrap_or_default()),
     };
-    let (Some(trajectory), Some(region)) = (&result.trajectory, &result.region) else { return result };
+    let (Some(trajectory), Some(region)) = (&result.trajectory, &result.region) else { return Ok(result) };
 
     result.lines = match config.geometry.lines {
         LineMethod::Triangulated => tracks::at_region(seen.lines, region),
@@ -119,6 +122,7 @@ pub(super) fn infer(
             tracks::unprojected(&in_views, region, &config.geometry, config.seed)
         }
     };
+    result.words = reasoner.words(&Sight { recording, clip, region, views: &result.views, lines: &result.lines })?;
     let surface = surface(recording, region, &result.views, &seen.looks.sketches, config.localization.reach_m);
     let around = face::Surroundings {
         surface: &surface,
@@ -141,6 +145,7 @@ pub(super) fn infer(
             rect: result.part.as_ref(),
             tracks: &result.lines,
             surface: &surface,
+            named: &result.words.as_ref().map_or_else(Vec::new, |w: &Words| w.named(result.lines.len())),
             manhattan: seen.room,
             grip: region.grip,
             path: &path,
@@ -161,6 +166,7 @@ pub(super) fn infer(
         .collect();
     let answer = reasoner.answer(&Question {
         reading: &located.reading,
+        words: result.words.as_ref(),
         path: &path,
         grip: region.grip,
         candidates: &result.candidates,
@@ -181,7 +187,7 @@ pub(super) fn infer(
         result.part = votes.moving_rect(&stops).or(result.part);
     }
     result.answer = Some(answer);
-    result
+    Ok(result)
 }
 
 /// Up, as the room's own upright edges have it where they are near the world's (which may be off by a degree).

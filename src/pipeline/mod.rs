@@ -18,6 +18,7 @@ use crate::hands::Trajectory;
 use crate::inference::ClipJoint;
 use crate::localization::{Region, views};
 use crate::math::Point;
+use crate::reasoning::words::Words;
 use crate::reasoning::{Answer, Reasoner};
 use crate::recording::sketch::Sketch;
 use crate::recording::{Clip, DepthFactors, Recording};
@@ -39,6 +40,9 @@ pub struct ClipResult {
     pub face: Option<Face>,
     /// The part of the face that was seen to move.
     pub part: Option<Rect>,
+    /// What a language model said, where one was asked (§3.3).
+    #[serde(default)]
+    pub words: Option<Words>,
     /// Candidate axes (§3.2).
     pub candidates: Vec<AxisCandidate>,
     /// The answers to the two questions (§3.3).
@@ -91,8 +95,8 @@ pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
 /// Runs hands, localisation, geometry, reasoning, inference and aggregation.
 ///
 /// # Errors
-/// Only what makes the whole recording unusable, and images that cannot be decoded. A clip without an answer is an
-/// answer: its reason stands in [`ClipResult::joint`].
+/// Only what makes the whole recording unusable, images that cannot be decoded, and a language model that refuses to be
+/// asked. A clip without an answer is an answer: its reason stands in [`ClipResult::joint`].
 pub fn infer(
     recording: &Recording,
     config: &Config,
@@ -192,7 +196,7 @@ pub fn infer(
             tick("inferring", total);
             result
         })
-        .collect();
+        .collect::<Result<_>>()?;
     let joints = scene::merge(&rectified, &looks.sketches, &clips, reasoner, config);
     let Recording { name: recording, depth_factors, .. } = rectified;
     Ok(Scene { recording, manhattan: room, depth_factors, clips, joints })

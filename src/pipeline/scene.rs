@@ -157,6 +157,7 @@ fn merge_group(
                 .collect();
             answers.push(reasoner.answer(&Question {
                 reading: &narration::read(&clips[c].clip),
+                words: clips[c].words.as_ref(),
                 path: &path,
                 grip,
                 candidates: &pooled,
@@ -187,7 +188,11 @@ fn merge_group(
         id: String::new(),
         joint,
         clips: group.iter().map(|&c| clips[c].clip.clip.clone()).collect(),
-        furniture: group.iter().find_map(|&c| narration::read(&clips[c].clip).furniture),
+        // Where people said "it", a model may have seen what it was.
+        furniture: group
+            .iter()
+            .find_map(|&c| narration::read(&clips[c].clip).furniture)
+            .or_else(|| group.iter().find_map(|&c| clips[c].words.as_ref()?.furniture.clone())),
         type_probability,
         grip,
         face,

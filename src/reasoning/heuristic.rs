@@ -9,6 +9,7 @@ use crate::config;
 use crate::geometry::{AxisCandidate, AxisSource, HingeSide};
 use crate::math::path;
 
+use super::words::line_factor;
 use super::{Answer, PartShape, Question, Reasoner};
 
 /// The geometric heuristic.
@@ -34,7 +35,7 @@ impl Reasoner for Geometric {
                 self.path_log_likelihood(candidate, question) + depth_log_likelihood(*agreement)
             })
             .collect();
-        let words_log_odds = match question.reading.kind {
+        let name = match question.reading.kind {
             Some(kind) => {
                 // A generic word is worth half of what a name is worth.
                 let strength = if question.reading.generic { 0.5 } else { 1.0 };
@@ -43,8 +44,16 @@ impl Reasoner for Geometric {
             }
             None => 0.0,
         };
+        let model = question.words.map_or(0.0, |w| w.log_odds(self.reasoning.vlm_accuracy));
+        let words_log_odds = of_both(name, model);
         Answer { log_likelihoods, log_priors: log_priors(question), words_log_odds }
     }
+}
+
+/// Log odds from the furniture's name and from a language model's answers. The model was told the narration: where both
+/// say the same it is one voice, and the louder counts; where they differ, the model saw something else, and both count.
+fn of_both(name: f64, model: f64) -> f64 {
+    if name * model > 0.0 { name.signum() * name.abs().max(model.abs()) } else { name + model }
 }
 
 impl Geometric {
@@ -89,9 +98,10 @@ fn depth_log_likelihood((share, count): (f64, usize)) -> f64 {
 /// times as likely to hold the hinge as three), times that of its place on the part.
 fn log_priors(question: &Question) -> Vec<f64> {
     let candidates = question.candidates;
-    // Lines that are long and seen often are edges of furniture rather than of its texture.
+    // Lines that are long and seen often are edges of furniture rather than of its texture, and lines that a language model
+    // takes for hinges rather than others.
     let raw = |c: &AxisCandidate| match c.source {
-        AxisSource::Line => (c.length_m + 0.05).sqrt() * (c.views as f64).sqrt(),
+        AxisSource::Line => (c.length_m + 0.05).sqrt() * (c.views as f64).sqrt() * line_factor(c.named),
         _ => 1.0,
     };
     candidates
@@ -165,13 +175,22 @@ mod tests {
             length_m: 0.5,
             position_std_m: 0.03,
             shift: 0.0,
+            named: 0.0,
         }
     }
 
     fn ask(path: &[Point], kind: Option<JointKind>, candidates: &[AxisCandidate], agreement: &[(f64, usize)]) -> f64 {
         let reading = Reading { moves_joint: Some(true), action: None, furniture: None, kind, generic: false };
         Geometric { reasoning: config::Reasoning::default(), inference: config::Inference::default() }
-            .answer(&Question { reading: &reading, path, grip: path[0], candidates, agreement, part: None })
+            .answer(&Question {
+                reading: &reading,
+                words: None,
+                path,
+                grip: path[0],
+                candidates,
+                agreement,
+                part: None,
+            })
             .revolute_probability(candidates)
     }
 
@@ -195,6 +214,42 @@ mod tests {
         let says_slide = ask(&short, None, &candidates, &[(0.2, 500), (0.9, 500)]);
         let says_hinge = ask(&short, None, &candidates, &[(0.9, 500), (0.2, 500)]);
         assert!(says_slide < 0.1 && says_hinge > 0.8);
+    }
+
+    #[test]
+    fn a_model_that_repeats_the_name_says_nothing_new_and_one_that_contradicts_it_does() {
+        let (name, model) = (9f64.ln(), 1.4 * 9f64.ln());
+        assert_eq!(of_both(name, model), model);
+        assert_eq!(of_both(-model, -name), -model);
+        assert_eq!(of_both(name, -model), name - model);
+        assert_eq!((of_both(0.0, model), of_both(name, 0.0)), (model, name));
+    }
+
+    #[test]
+    fn a_line_that_was_named_takes_from_the_other_lines_only() {
+        let line = |named: f64| AxisCandidate {
+            named,
+            views: 4,
+            ..candidate(JointKind::Revolute, Vector::z(), Point::origin(), AxisSource::Line)
+        };
+        let edge = candidate(JointKind::Revolute, Vector::z(), Point::origin(), AxisSource::PartEdge);
+        let reading = Reading { moves_joint: Some(true), action: None, furniture: None, kind: None, generic: false };
+        let priors = |named: f64| {
+            let candidates = [line(named), line(0.0), edge.clone()];
+            log_priors(&Question {
+                reading: &reading,
+                words: None,
+                path: &[],
+                grip: Point::origin(),
+                candidates: &candidates,
+                agreement: &[],
+                part: None,
+            })
+        };
+        let (before, after) = (priors(0.0), priors(1.0));
+        assert!((after[0] - after[1] - 5f64.ln()).abs() < 1e-12 && before[0] == before[1]);
+        assert!((after[0].exp() + after[1].exp() - before[0].exp() - before[1].exp()).abs() < 1e-12);
+        assert_eq!(before[2], after[2]);
     }
 
     #[test]

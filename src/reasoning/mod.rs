@@ -1,13 +1,20 @@
 //! The two questions of §3.3 and §A.6: how does the part move, and which of the lines could be its hinge?
 //!
 //! Whoever answers does so through [`Reasoner`]. [`heuristic::Geometric`] answers without any network (the paper's row
-//! "w/o GPT-4o"); its absence of a language model is a normal mode of work.
+//! "w/o GPT-4o"); its absence of a language model is a normal mode of work. [`words::Asking`] asks one as well, and adds
+//! what it says to the evidence.
 
+pub mod answers;
 pub mod heuristic;
+pub mod marks;
+pub mod prompts;
+pub mod simulated;
+pub mod words;
 
 use serde::{Deserialize, Serialize};
 
 use crate::articulation::JointKind;
+use crate::error::Result;
 use crate::geometry::AxisCandidate;
 use crate::math::Point;
 use crate::recording::narration::Reading;
@@ -17,6 +24,8 @@ use crate::recording::narration::Reading;
 pub struct Question<'a> {
     /// What the narration says.
     pub reading: &'a Reading,
+    /// What a language model says, where one was asked.
+    pub words: Option<&'a words::Words>,
     /// The hand's smoothed path, world.
     pub path: &'a [Point],
     /// The grip at the closed end.
@@ -96,6 +105,14 @@ fn log_sum(values: &[f64]) -> f64 {
 
 /// Whoever answers.
 pub trait Reasoner: Sync {
+    /// What a language model says about a clip; `None` where none is asked.
+    ///
+    /// # Errors
+    /// What must end the run: see [`crate::vlm::Model::ask`].
+    fn words(&self, _sight: &words::Sight) -> Result<Option<words::Words>> {
+        Ok(None)
+    }
+
     /// Answers both questions for one clip.
     fn answer(&self, question: &Question) -> Answer;
 

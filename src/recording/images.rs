@@ -72,6 +72,11 @@ pub fn grey(path: &Path, camera: &Camera) -> Result<Grid<u8>> {
     Ok(grid(camera, decode(path, camera)?.into_luma8().into_raw()))
 }
 
+/// Any colour image as RGB.
+pub fn rgb(path: &Path, camera: &Camera) -> Result<Grid<[u8; 3]>> {
+    Ok(grid(camera, decode(path, camera)?.into_rgb8().pixels().map(|p| p.0).collect()))
+}
+
 /// `n = (value - 128) / 127`, normalised; (0, 0, 0) and vectors far from unit length become zero = no value.
 pub fn normals(path: &Path, camera: &Camera) -> Result<Grid<[f32; 3]>> {
     match decode(path, camera)? {

@@ -247,6 +247,11 @@ impl Recording {
         self.read(frame, |f| f.rgb.as_ref(), images::grey)
     }
 
+    /// Colour image. `None` where the frame has no image file.
+    pub fn rgb(&self, frame: usize) -> Result<Option<Grid<[u8; 3]>>> {
+        self.read(frame, |f| f.rgb.as_ref(), images::rgb)
+    }
+
     /// Unit normals in the camera frame; zero = none. `None` where the frame has no normals file.
     pub fn normals(&self, frame: usize) -> Result<Option<Grid<[f32; 3]>>> {
         self.read(frame, |f| f.normals.as_ref(), images::normals)

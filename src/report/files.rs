@@ -7,6 +7,7 @@ use crate::evaluation::{Prediction, Predictions};
 use crate::inference::{self, ClipJoint};
 use crate::math::Point;
 use crate::pipeline::Scene;
+use crate::reasoning::words::Words;
 use crate::twin::Twin;
 
 /// One joint of `articulations.json`.
@@ -29,6 +30,8 @@ struct ClipEntry<'a> {
     narration: &'a str,
     joint_of_scene: Option<&'a str>,
     outcome: &'a Outcome<ClipJoint>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    words: Option<&'a Words>,
     evidence: Evidence,
 }
 
@@ -87,6 +90,7 @@ pub fn articulations(scene: &Scene, reasoner: &str) -> crate::error::Result<Stri
                 narration: &c.clip.narration,
                 joint_of_scene: scene.joints.iter().find(|j| j.clips.contains(&c.clip.clip)).map(|j| j.id.as_str()),
                 outcome: &c.joint,
+                words: c.words.as_ref(),
                 evidence: Evidence {
                     hand_samples: c.trajectory.as_ref().map_or(0, |t| t.samples.len()),
                     rejected_hand_samples: c

@@ -1,5 +1,6 @@
 //! What the tests share: recordings made once, the binary, data that may be there.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::LazyLock;
@@ -63,6 +64,24 @@ pub fn copy(from: &Path, to: &Path) {
     }
 }
 
+/// All files below a folder with their bytes.
+pub fn tree(dir: &Path) -> BTreeMap<String, Vec<u8>> {
+    fn collect(dir: &Path, prefix: &str, out: &mut BTreeMap<String, Vec<u8>>) {
+        for entry in std::fs::read_dir(dir).unwrap() {
+            let entry = entry.unwrap();
+            let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
+            if entry.path().is_dir() {
+                collect(&entry.path(), &format!("{name}/"), out);
+            } else {
+                out.insert(name, std::fs::read(entry.path()).unwrap());
+            }
+        }
+    }
+    let mut all = BTreeMap::new();
+    collect(dir, "", &mut all);
+    all
+}
+
 /// Runs `paws`.
 pub fn paws(args: &[&str], dir: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_paws")).args(args).current_dir(dir).output().unwrap()
@@ -89,4 +108,39 @@ pub fn optional_data(name: &str) -> Option<PathBuf> {
 pub fn skipped(why: &str) {
     use std::io::Write;
     let _ = writeln!(std::io::stderr(), "skipped: {why}");
+}
+
+/// Python with what `tests/NAME/requirements.txt` asks for, in an environment of the tests' own, made on first use.
+///
+/// `None`, and a word, where there is no Python 3 or no PyPI; there `CI` or `PAWS_REQUIRE_SIMULATORS` make it a failure.
+pub fn python(name: &str) -> Option<PathBuf> {
+    let required = ["CI", "PAWS_REQUIRE_SIMULATORS"].iter().any(|v| std::env::var_os(v).is_some_and(|x| !x.is_empty()));
+    match environment(name) {
+        Ok(python) => Some(python),
+        Err(reason) if required => panic!("the checks of tests/{name} cannot run: {reason}"),
+        Err(reason) => {
+            skipped(&format!("the checks of tests/{name} need python3 and PyPI ({reason})"));
+            None
+        }
+    }
+}
+
+fn environment(name: &str) -> Result<PathBuf, String> {
+    let requirements = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests").join(name).join("requirements.txt");
+    let home = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let python = home.join("bin/python");
+    let stamp = home.join("requirements.txt");
+    let wanted = std::fs::read_to_string(&requirements).map_err(|e| e.to_string())?;
+    if std::fs::read_to_string(&stamp).is_ok_and(|have| have == wanted) {
+        return Ok(python);
+    }
+    let run = |what: &str, command: &mut Command| -> Result<(), String> {
+        let out = command.output().map_err(|e| format!("{what}: {e}"))?;
+        let tail: String = String::from_utf8_lossy(&out.stderr).lines().rev().take(3).collect::<Vec<_>>().join(" | ");
+        if out.status.success() { Ok(()) } else { Err(format!("{what} failed: {tail}")) }
+    };
+    run("python3 -m venv", Command::new("python3").args(["-m", "venv", "--clear"]).arg(&home))?;
+    run("pip install", Command::new(&python).args(["-m", "pip", "install", "--quiet", "-r"]).arg(&requirements))?;
+    std::fs::write(&stamp, wanted).map_err(|e| e.to_string())?;
+    Ok(python)
 }

@@ -12,3 +12,4 @@ mod physics;
 mod real_recordings;
 mod same_bytes;
 mod simulators;
+mod words;

@@ -1,22 +1,9 @@
 //! The same input gives the same bytes, on any number of threads.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 use std::process::Command;
 
-use crate::common::SMALL;
-
-fn files(dir: &Path, prefix: &str, out: &mut BTreeMap<String, Vec<u8>>) {
-    for entry in std::fs::read_dir(dir).unwrap() {
-        let entry = entry.unwrap();
-        let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
-        if entry.path().is_dir() {
-            files(&entry.path(), &format!("{name}/"), out);
-        } else {
-            out.insert(name, std::fs::read(entry.path()).unwrap());
-        }
-    }
-}
+use crate::common::{SMALL, tree};
 
 fn twin(threads: &str) -> BTreeMap<String, Vec<u8>> {
     let dir = tempfile::tempdir().unwrap();
@@ -27,9 +14,7 @@ fn twin(threads: &str) -> BTreeMap<String, Vec<u8>> {
         .output()
         .unwrap();
     assert_ne!(status.status.code(), Some(2), "{}", String::from_utf8_lossy(&status.stderr));
-    let mut all = BTreeMap::new();
-    files(&dir.path().join("t"), "", &mut all);
-    all
+    tree(&dir.path().join("t"))
 }
 
 #[test]

@@ -1,0 +1,263 @@
+//! `--vlm-url` and what goes with it: a language model's words about the pictures.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+use anyhow::bail;
+use clap::Args;
+
+use super::progress::Steps;
+use super::{Answer, print};
+use crate::config::Config;
+use crate::geometry::segments::Lsd;
+use crate::pipeline::{self, Scene};
+use crate::reasoning::Reasoner;
+use crate::reasoning::heuristic::Geometric;
+use crate::reasoning::prompts::Prompts;
+use crate::reasoning::words::Asking;
+use crate::recording::Recording;
+use crate::vlm::absent::{DryRun, Replay};
+use crate::vlm::server::{self, Key, Limits, Server};
+use crate::vlm::store::Stored;
+use crate::vlm::{Model, Question, Usage};
+
+const HEADING: &str = "Language model (optional)";
+/// Where a key is looked for when nobody says where.
+const USUAL_KEY: &str = "OPENAI_API_KEY";
+
+/// Arguments of the commands that can ask a language model.
+#[derive(Debug, Clone, Args)]
+pub struct WordsArgs {
+    /// Ask a vision-language model at this OpenAI-compatible address (OpenAI, vLLM, Ollama, llama.cpp)
+    #[arg(long, value_name = "URL", requires = "vlm_model", help_heading = HEADING)]
+    vlm_url: Option<String>,
+    /// The model, as its server calls it
+    #[arg(long, value_name = "NAME", help_heading = HEADING)]
+    vlm_model: Option<String>,
+    /// Environment variable that holds the key [default: OPENAI_API_KEY, for https and this machine only]
+    #[arg(long, value_name = "NAME", help_heading = HEADING)]
+    vlm_key_env: Option<String>,
+    /// Requests under way at the same time
+    #[arg(long, value_name = "N", default_value_t = 4, help_heading = HEADING,
+        value_parser = clap::value_parser!(u32).range(1..=64))]
+    vlm_concurrency: u32,
+    /// Seconds until a request without an answer is given up
+    #[arg(long, value_name = "SECS", default_value_t = 120, help_heading = HEADING,
+        value_parser = clap::value_parser!(u64).range(1..=3600))]
+    vlm_timeout: u64,
+    /// Send no more requests than this, repetitions included
+    #[arg(long, value_name = "N", default_value_t = 1000, help_heading = HEADING)]
+    max_requests: usize,
+    /// Ask nothing: count requests, pictures and tokens
+    #[arg(long, requires = "vlm_model", conflicts_with = "replay", help_heading = HEADING)]
+    dry_run: bool,
+    /// Folder where answers are kept and looked up [default: answers/ in the recording]
+    #[arg(long, value_name = "DIR", requires = "vlm_model", help_heading = HEADING)]
+    answers: Option<PathBuf>,
+    /// Use kept answers only, without any network
+    #[arg(long, requires = "vlm_model", help_heading = HEADING)]
+    replay: bool,
+    /// Folder with prompts of your own: motion_type.txt, summary.txt, axis_choice.txt
+    #[arg(long, value_name = "DIR", requires = "vlm_model", help_heading = HEADING)]
+    templates: Option<PathBuf>,
+}
+
+/// What becomes of questions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Mode {
+    Ask,
+    DryRun,
+    Replay,
+}
+
+/// Who is asked, and how.
+pub struct Asked {
+    base: Box<dyn Model>,
+    mode: Mode,
+    prompts: Prompts,
+    at_once: usize,
+    answers: Option<PathBuf>,
+}
+
+impl WordsArgs {
+    /// `None` where no model is to be asked.
+    pub fn open(&self) -> anyhow::Result<Option<Asked>> {
+        let Some(model) = &self.vlm_model else { return Ok(None) };
+        let (mode, base): (Mode, Box<dyn Model>) = match &self.vlm_url {
+            _ if self.dry_run => (Mode::DryRun, Box::new(DryRun::new(model))),
+            _ if self.replay => (Mode::Replay, Box::new(Replay::new(model))),
+            Some(url) => {
+                let limits = Limits {
+                    request: Duration::from_secs(self.vlm_timeout),
+                    at_once: self.vlm_concurrency as usize,
+                    max_requests: self.max_requests,
+                    ..Limits::default()
+                };
+                (Mode::Ask, Box::new(Server::new(url, model, self.key(url)?, limits)?))
+            }
+            None => bail!("--vlm-model needs to know who answers: --vlm-url, --replay, or --dry-run"),
+        };
+        let prompts = self.templates.as_deref().map_or_else(Prompts::built_in, Prompts::read)?;
+        let at_once = self.vlm_concurrency as usize;
+        Ok(Some(Asked { base, mode, prompts, at_once, answers: self.answers.clone() }))
+    }
+
+    fn key(&self, url: &str) -> anyhow::Result<Option<Key>> {
+        let Some(variable) = &self.vlm_key_env else {
+            // Somebody's key for one service is nobody else's business, and no unencrypted line's.
+            let safe = url.trim().to_ascii_lowercase().starts_with("https://") || server::is_loopback(url);
+            return Ok(if safe { Key::from_env(USUAL_KEY)? } else { None });
+        };
+        // What was given is not repeated: it may be the key itself.
+        if !variable.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
+            bail!("--vlm-key-env takes the name of an environment variable, not a key");
+        }
+        match Key::from_env(variable)? {
+            Some(key) => Ok(Some(key)),
+            None => bail!("the environment variable that --vlm-key-env names is not set"),
+        }
+    }
+}
+
+impl Asked {
+    /// The model's name.
+    pub fn model(&self) -> &str {
+        self.base.name()
+    }
+
+    /// The folder of answers, where it is not the recording's own.
+    pub fn answers(&self) -> Option<&Path> {
+        self.answers.as_deref()
+    }
+
+    /// Whether nothing is to be asked or written.
+    pub fn is_dry(&self) -> bool {
+        self.mode == Mode::DryRun
+    }
+
+    /// Counts what would be asked about some recordings.
+    pub fn count(&self, recordings: &[Recording], config: &Config) -> anyhow::Result<Answer> {
+        let mut total: Option<Usage> = None;
+        for recording in recordings {
+            let steps = Steps::new();
+            let usage = infer(recording, config, Some(self), &steps, false)?.usage;
+            steps.finish();
+            total = added(total, usage);
+        }
+        let usage = total.unwrap_or_default();
+        print(&format!(
+            "{}: at most {} questions with {} pictures, about {} tokens of prompts (a token for four bytes of text, pictures \
+             as OpenAI counts them); {} more are answered already. Nothing was asked.\n",
+            self.model(),
+            usage.asked,
+            usage.pictures,
+            usage.tokens,
+            usage.from_store
+        ))?;
+        Ok(Answer::Yes)
+    }
+
+    /// The model with its answers beside a recording.
+    fn beside<'a>(&'a self, recording: &Recording, steps: &'a Steps, keep: bool) -> anyhow::Result<Watched<'a>> {
+        let dir = self.answers.clone().unwrap_or_else(|| recording.dir.join("answers"));
+        let base: &'a dyn Model = &*self.base;
+        let stored = match self.mode {
+            Mode::Ask => Stored::new(base, &dir)?,
+            Mode::DryRun | Mode::Replay => Stored::reading(base, &dir),
+        };
+        Ok(Watched { stored, steps, count: AtomicUsize::new(0), keep, exchanges: Mutex::default() })
+    }
+}
+
+/// A question with its answer.
+pub struct Exchange {
+    /// What was asked.
+    pub question: Question,
+    /// What was said.
+    pub answer: Option<String>,
+}
+
+impl Exchange {
+    /// The clip that it is about.
+    pub fn clip(&self) -> &str {
+        self.question.purpose.rsplit_once('/').map_or("", |(clip, _)| clip)
+    }
+
+    /// A name among the clip's exchanges.
+    pub fn name(&self) -> &str {
+        self.question.purpose.rsplit_once('/').map_or(&self.question.purpose, |(_, name)| name)
+    }
+}
+
+/// A model under a progress bar, whose exchanges are kept where somebody wants to see them.
+struct Watched<'a> {
+    stored: Stored<&'a dyn Model>,
+    steps: &'a Steps,
+    count: AtomicUsize,
+    keep: bool,
+    exchanges: Mutex<Vec<Exchange>>,
+}
+
+impl Model for Watched<'_> {
+    fn ask(&self, question: &Question) -> crate::error::Result<Option<String>> {
+        let answer = self.stored.ask(question)?;
+        let count = self.count.fetch_add(1, Ordering::Relaxed) + 1;
+        self.steps.note(format!("{count} questions"));
+        if self.keep {
+            let exchange = Exchange { question: question.clone(), answer: answer.clone() };
+            self.exchanges.lock().unwrap_or_else(PoisonError::into_inner).push(exchange);
+        }
+        Ok(answer)
+    }
+
+    fn name(&self) -> &str {
+        self.stored.name()
+    }
+
+    fn usage(&self) -> Usage {
+        self.stored.usage()
+    }
+}
+
+/// What the pipeline found, and what was asked on the way.
+pub struct Inferred {
+    /// The scene.
+    pub scene: Scene,
+    /// Who answered, for the evidence.
+    pub reasoner: String,
+    /// What was asked so far, where a model is asked.
+    pub usage: Option<Usage>,
+    /// All questions with their answers, where they were to be kept.
+    pub exchanges: Vec<Exchange>,
+}
+
+/// Runs the pipeline, with a model's words where one is to be asked.
+pub fn infer(
+    recording: &Recording,
+    config: &Config,
+    asked: Option<&Asked>,
+    steps: &Steps,
+    keep: bool,
+) -> anyhow::Result<Inferred> {
+    let geometric = Geometric { reasoning: config.reasoning.clone(), inference: config.inference.clone() };
+    let report = |step: &str, done: usize, total: usize| steps.report(step, done, total);
+    let Some(asked) = asked else {
+        let scene = pipeline::infer(recording, config, &Lsd, &geometric, &report)?;
+        return Ok(Inferred { scene, reasoner: geometric.name().to_owned(), usage: None, exchanges: Vec::new() });
+    };
+    let model = asked.beside(recording, steps, keep)?;
+    let asking = Asking { geometric: &geometric, model: &model, prompts: &asked.prompts, at_once: asked.at_once };
+    let scene = pipeline::infer(recording, config, &Lsd, &asking, &report)?;
+    let reasoner = format!("{} ({})", asking.name(), asked.model());
+    let usage = Some(model.usage());
+    let exchanges = model.exchanges.into_inner().unwrap_or_else(PoisonError::into_inner);
+    Ok(Inferred { scene, reasoner, usage, exchanges })
+}
+
+/// The usage after one more recording: the model counts over all of them, stored answers are counted by recording.
+pub fn added(total: Option<Usage>, usage: Option<Usage>) -> Option<Usage> {
+    let before = total.map_or(0, |t| t.from_store);
+    usage.map(|u| Usage { from_store: before + u.from_store, ..u })
+}

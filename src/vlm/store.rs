@@ -1,0 +1,202 @@
+//! Answers on disk, one JSON file each, named by what was asked: a second run asks nothing.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::{Model, Question, Usage};
+use crate::error::{Error, Result};
+use crate::json;
+
+/// A stored answer. The name of the file follows from model, sampling, prompt and pictures; the answer may be corrected by
+/// hand.
+#[derive(Debug, Serialize, Deserialize)]
+struct Record {
+    model: String,
+    purpose: String,
+    temperature: f64,
+    top_p: f64,
+    max_tokens: usize,
+    prompt: String,
+    /// SHA-256 of each picture's bytes.
+    pictures: Vec<String>,
+    answer: String,
+}
+
+/// A model with a memory.
+#[derive(Debug)]
+pub struct Stored<M> {
+    inner: M,
+    dir: PathBuf,
+    writes: bool,
+    from_store: AtomicUsize,
+    written: AtomicUsize,
+}
+
+impl<M: Model> Stored<M> {
+    /// Answers from `dir` where it can, asks `inner` where it cannot, and keeps what `inner` says.
+    ///
+    /// # Errors
+    /// Where the folder cannot be made.
+    pub fn new(inner: M, dir: &Path) -> Result<Self> {
+        std::fs::create_dir_all(dir).map_err(|e| {
+            let mut error = Error::io(dir, &e);
+            if let Error::Io { message, .. } = &mut error {
+                *message += "; answers are kept there, choose another folder with --answers";
+            }
+            error
+        })?;
+        Ok(Self { writes: true, ..Self::reading(inner, dir) })
+    }
+
+    /// The same, but keeps nothing: for a dry run and a replay.
+    #[must_use]
+    pub fn reading(inner: M, dir: &Path) -> Self {
+        Self {
+            inner,
+            dir: dir.to_owned(),
+            writes: false,
+            from_store: AtomicUsize::new(0),
+            written: AtomicUsize::new(0),
+        }
+    }
+
+    fn path(&self, question: &Question) -> PathBuf {
+        self.dir.join(format!("{}.json", key(self.inner.name(), question)))
+    }
+
+    /// Through a file beside its place: a reader never sees half an answer.
+    fn keep(&self, question: &Question, answer: &str) -> Result<()> {
+        let record = Record {
+            model: self.inner.name().to_owned(),
+            purpose: question.purpose.clone(),
+            temperature: question.sampling.temperature,
+            top_p: question.sampling.top_p,
+            max_tokens: question.sampling.max_tokens,
+            prompt: question.text.clone(),
+            pictures: question.pictures.iter().map(|p| hex(&Sha256::digest(&p.bytes))).collect(),
+            answer: answer.to_owned(),
+        };
+        let path = self.path(question);
+        let number = self.written.fetch_add(1, Ordering::Relaxed);
+        let staging = self.dir.join(format!(".partial-{}-{number}", std::process::id()));
+        let text = json::text(&record)?;
+        std::fs::write(&staging, text).and_then(|()| std::fs::rename(&staging, &path)).map_err(|e| {
+            let _ = std::fs::remove_file(&staging);
+            Error::io(&path, &e)
+        })
+    }
+}
+
+impl<M: Model> Model for Stored<M> {
+    fn ask(&self, question: &Question) -> Result<Option<String>> {
+        let path = self.path(question);
+        if path.is_file() {
+            let record: Record = json::read(&path)?;
+            self.from_store.fetch_add(1, Ordering::Relaxed);
+            return Ok(Some(record.answer));
+        }
+        let answer = self.inner.ask(question)?;
+        if let Some(answer) = answer.as_deref().filter(|_| self.writes) {
+            self.keep(question, answer)?;
+        }
+        Ok(answer)
+    }
+
+    fn name(&self) -> &str {
+        self.inner.name()
+    }
+
+    fn usage(&self) -> Usage {
+        let usage = self.inner.usage();
+        Usage { from_store: usage.from_store + self.from_store.load(Ordering::Relaxed), ..usage }
+    }
+}
+
+/// Names an answer by everything that it depends on; where the model is served does not matter.
+fn key(model: &str, question: &Question) -> String {
+    let mut hash = Sha256::new();
+    // Lengths in front, so that no two questions run together to the same bytes.
+    let mut add = |bytes: &[u8]| {
+        hash.update((bytes.len() as u64).to_le_bytes());
+        hash.update(bytes);
+    };
+    let sampling = question.sampling;
+    add(b"paws answer 1");
+    add(model.as_bytes());
+    add(format!("{:?} {:?} {}", sampling.temperature, sampling.top_p, sampling.max_tokens).as_bytes());
+    add(question.text.as_bytes());
+    for picture in &question.pictures {
+        add(picture.mime.as_bytes());
+        add(&picture.bytes);
+    }
+    hex(&hash.finalize())
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::with_capacity(2 * bytes.len()), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vlm::absent::{DryRun, Replay};
+    use crate::vlm::{Picture, Sampling};
+
+    fn question(text: &str, bytes: &[u8]) -> Question {
+        Question {
+            purpose: "clip/name".to_owned(),
+            text: text.to_owned(),
+            pictures: vec![Picture { bytes: bytes.to_vec(), mime: "image/jpeg", size: [8, 8] }],
+            sampling: Sampling { temperature: 0.5, top_p: 0.3, max_tokens: 300 },
+        }
+    }
+
+    #[test]
+    fn the_name_of_an_answer_changes_with_everything_it_depends_on() {
+        let base = question("a", &[1, 2]);
+        let hotter = Question { sampling: Sampling { temperature: 0.6, ..base.sampling }, ..base.clone() };
+        let elsewhere = Question { purpose: "other/name".to_owned(), ..base.clone() };
+        let name = key("m", &base);
+        assert_eq!(name.len(), 64);
+        assert_eq!(name, key("m", &elsewhere));
+        for other in
+            [key("n", &base), key("m", &hotter), key("m", &question("b", &[1, 2])), key("m", &question("a", &[1]))]
+        {
+            assert_ne!(name, other);
+        }
+    }
+
+    #[test]
+    fn an_answer_is_given_once_and_kept() {
+        let dir = tempfile::tempdir().unwrap();
+        let stored = Stored::new(DryRun::new("m"), dir.path()).unwrap();
+        let q = question("a", &[1]);
+        assert_eq!(stored.ask(&q).unwrap().as_deref(), Some("unknown"));
+        assert_eq!(stored.ask(&q).unwrap().as_deref(), Some("unknown"));
+        let usage = stored.usage();
+        assert_eq!((usage.asked, usage.from_store), (1, 1));
+
+        let replay = Stored::reading(Replay::new("m"), dir.path());
+        assert_eq!(replay.ask(&q).unwrap().as_deref(), Some("unknown"));
+        assert_eq!(replay.ask(&question("b", &[1])).unwrap(), None);
+        assert_eq!((replay.usage().from_store, replay.usage().failures()), (1, 1));
+        let names: Vec<_> = std::fs::read_dir(dir.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
+        assert_eq!(names.len(), 1, "{names:?}");
+    }
+
+    #[test]
+    fn a_damaged_answer_is_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let stored = Stored::new(Replay::new("m"), dir.path()).unwrap();
+        let q = question("a", &[1]);
+        std::fs::write(stored.path(&q), "{").unwrap();
+        assert!(stored.ask(&q).unwrap_err().to_string().contains(".json"));
+    }
+}
