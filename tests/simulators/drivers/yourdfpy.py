@@ -1,0 +1,42 @@
+"""yourdfpy: the reader behind many Python tools."""
+
+import importlib.metadata
+
+import numpy as np
+import yourdfpy
+
+from definition import Limits, Reader, all_but
+
+from . import captured
+from .text import FILES
+
+
+class Urdf(Reader):
+    format, simulator, version = "URDF", "yourdfpy", importlib.metadata.version("yourdfpy")
+    cannot = all_but({1, 2, 9, 15}, "kinematics only")
+
+    def __init__(self, twin):
+        self.twin = twin
+        with captured() as said:
+            self.robot = yourdfpy.URDF.load(str(twin.folder / FILES["URDF"]))
+            valid = self.robot.validate()
+        self.warnings = said.text if valid else f"{said.text}\nvalidate() is False: {self.robot.errors}"
+
+    def limits(self):
+        read = {}
+        for name, joint in self.robot.joint_map.items():
+            if joint.type == "fixed":
+                continue
+            # It keeps some of the numbers as text.
+            limit, dynamics = joint.limit, joint.dynamics
+            rest = (float(x) for x in (dynamics.damping, dynamics.friction, limit.effort, limit.velocity))
+            read[name] = Limits(float(limit.lower), float(limit.upper), np.array(joint.axis, float), *rest)
+        return read
+
+    def handles(self, share):
+        self.robot.update_cfg({p.name: share * p.upper for p in self.twin.parts})
+        homogeneous = lambda p: np.append(p.handle - p.origin, 1.0)
+        return {p.name: (self.robot.get_transform(p.link) @ homogeneous(p))[:3] for p in self.twin.parts}
+
+
+READERS = [Urdf]
