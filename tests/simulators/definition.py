@@ -22,16 +22,19 @@ PLACE_M = 1e-5
 MASS_SHARE = 1e-3
 AT_REST = 1e-3
 FINAL_SPEED = 1e-2
-OVERSHOOT = {"revolute": 0.025, "prismatic": 0.010}
+# How far past its stop per speed of arrival. A critically damped stop of 20 ms, the softest default (MuJoCo's), lets
+# v * 20 ms / e through: 0.025 rad for a door that arrives at 3.3 rad/s, 0.010 m for a drawer at 1.3 m/s.
+OVERSHOOT_SECS = 0.0077
 PENETRATION_M = 1e-3
 CLEARANCE_M = 1e-3
 TIME_SHARE = 0.03
 STEP_SHARE = 0.02
+CREEP_SHARE = 0.02
 
 # The hand: it pulls square to the lever at a hinge's handle, along the axis at a slide's.
 PULL_N = {"revolute": 5.0, "prismatic": 15.0}
 REST_SECS = 2.0
-SETTLE_SECS = 0.6
+SETTLE_SECS = 0.5
 LONGEST_SECS = 8.0
 SWEEP_POSES = 51
 
@@ -305,7 +308,7 @@ class Engine(Reader):
         return ""
 
     def kinetic(self, part):
-        """Kinetic energy, J: the engine's own where it tells, else from the velocity."""
+        """Kinetic energy of a part, J: with the engine's own inertia where it tells."""
         return 0.5 * (part.inertia + self.armature) * self.state(part.name)[1] ** 2
 
     @functools.cached_property
@@ -560,7 +563,7 @@ def sweep(twin, engine):
 
 @point(12, "hand: opens in the closed form's time, stops, closes again")
 def hand(twin, engine):
-    slowest, past, fell = 0.0, 0.0, 0.0
+    slowest, past = 0.0, 0.0
     for p in twin.parts:
         t = engine.trial(p)
         if not all(r.finite for r in (t.timed, t.open, t.back)):
@@ -576,42 +579,48 @@ def hand(twin, engine):
         for r, stop in ((t.timed, p.upper), (t.open, p.upper)):
             if abs(r.end - stop) > AT_REST or abs(r.speed) > FINAL_SPEED:
                 yield f"{p.name}: held open at {r.end - stop:+.4f} from its stop, moving at {r.speed:.4f}"
-        over = max(t.open.farthest - p.upper, -t.back.farthest)
-        if over > OVERSHOOT[p.kind]:
-            yield f"{p.name}: goes {over:.4f} past its stop"
+        for r, over in (
+            (t.timed, t.timed.farthest - p.upper),
+            (t.open, t.open.farthest - p.upper),
+            (t.back, -t.back.farthest),
+        ):
+            speed = math.sqrt(2 * r.peak / (p.inertia + engine.armature))
+            past = max(past, over / speed)
+            if over > OVERSHOOT_SECS * speed:
+                yield f"{p.name}: goes {over:.4f} past its stop, arriving at {speed:.2f}"
         if t.back.when is None or abs(t.back.end) > AT_REST:
             yield f"{p.name}: closes to {t.back.end:.4f}"
-        slowest, past = max(slowest, abs(error)), max(past, over / OVERSHOOT[p.kind])
-        fell = max(fell, t.timed.farthest - p.upper if p.heavy else 0.0)
+        slowest = max(slowest, abs(error))
     yield Measured("t95 off by", 100 * slowest, "%")
-    yield Measured("overshoot", 100 * past, "% of what is allowed")
-    if fell:
-        yield Measured("let fall, past its stop by", fell, "rad")
+    yield Measured("past a stop, per speed of arrival", 1000 * past, "ms")
 
 
 @point(13, "energy: no more than was put in; half the time step changes nothing")
 def energy(twin, engine):
-    fine = engine.again(engine.step_secs / 2)
-    worst = 0.0
     for p in twin.parts:
         t = engine.trial(p)
         for r in (t.timed, t.open, t.back):
             if r.excess > 0.01 * r.peak + 1e-6:
                 yield f"{p.name}: {r.excess:.4f} J more than the hand and gravity put in (peak {r.peak:.2f} J)"
+    fine, worst = engine.again(engine.step_secs / 2), 0.0
+    # The lightest of each kind is the quickest.
+    for kind in sorted({p.kind for p in twin.parts}):
+        p = min((p for p in twin.parts if p.kind == kind), key=lambda p: p.inertia)
         fine.put({})
-        half = run(fine, p, 1, lambda _, p=p: p.pull(1), settle=False)
-        if t.timed.when is None or half.when is None:
+        coarse, half = engine.trial(p).timed.when, run(fine, p, 1, lambda _, p=p: p.pull(1), settle=False).when
+        if coarse is None or half is None:
             yield f"{p.name}: does not open"
             continue
-        change = half.when / t.timed.when - 1
-        worst = max(worst, abs(change))
-        if abs(change) > STEP_SHARE:
-            yield f"{p.name}: {t.timed.when:.4f} s, with half the time step {half.when:.4f} s"
+        worst = max(worst, abs(half / coarse - 1))
+        if abs(half / coarse - 1) > STEP_SHARE:
+            yield f"{p.name}: {coarse:.4f} s, with half the time step {half:.4f} s"
     yield Measured("half step changes", 100 * worst, "%")
 
 
 @point(14, "half the dry friction does not move it")
 def stays(twin, engine):
+    # Engines that regularise friction let a part creep: two hundredths of the way it would go without friction.
+    worst = 0.0
     for p in twin.parts:
         pull = 0.5 * p.friction
         # Half open where gravity leaves it there, else closed: what gravity alone moves says nothing about friction.
@@ -622,9 +631,11 @@ def stays(twin, engine):
         point, force = p.at(p.handle, start), pull / p.lever * p.square(start)
         for _ in range(int(1.0 / engine.step_secs)):
             engine.step((p, force, point))
-        moved = engine.state(p.name)[0] - start
-        if not abs(moved) <= AT_REST:
-            yield f"{p.name}: moves by {moved:.4f} in 1 s under half its friction"
+        moved = abs(engine.state(p.name)[0] - start) / (0.5 * pull / p.inertia)
+        worst = max(worst, moved)
+        if not moved <= CREEP_SHARE:
+            yield f"{p.name}: goes {moved:.1%} of the way that it would go without friction"
+    yield Measured("creep under half the friction", 100 * worst, "% of the way without friction")
 
 
 @point(15, "read back: limits, damping, friction as in the model")
@@ -649,7 +660,7 @@ def same(twin, reader):
 
 
 def evaluate(twin, reader, numbers=None):
-    """[(point, status, reasons, measured)], status ok, FAIL or n.a., of some points or of all that concern the format."""
+    """[(point, status, reasons, measured)] of the points that concern the format; status ok, FAIL or n.a."""
     rows = []
     for p in POINTS:
         if not p.concerns(reader) or (numbers and p.number not in numbers):

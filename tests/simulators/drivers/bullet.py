@@ -7,7 +7,6 @@ every joint is held by a velocity motor until its force is set to 0, and joint f
 import importlib.metadata
 
 import numpy as np
-
 from definition import Body, Engine, Limits
 
 from . import captured

@@ -7,7 +7,6 @@ import shutil
 import subprocess
 
 import numpy as np
-
 from definition import Limits, Reader, all_but
 
 from .text import FILES, SAFE, rewritten

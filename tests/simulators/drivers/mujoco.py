@@ -2,7 +2,6 @@
 
 import mujoco
 import numpy as np
-
 from definition import Body, Engine, Limits
 
 from . import captured
@@ -100,8 +99,10 @@ class MuJoCo(Engine):
         return float(self.data.qpos[j.qposadr[0]]), float(self.data.qvel[j.dofadr[0]])
 
     def kinetic(self, part):
-        mujoco.mj_energyVel(self.model, self.data)
-        return float(self.data.energy[1])
+        dof = self.joint[part.name].dofadr[0]
+        # The diagonal is the last of each row.
+        diagonal = self.data.M[self.model.M_rowadr[dof] + self.model.M_rownnz[dof] - 1]
+        return 0.5 * float(diagonal * self.data.qvel[dof] ** 2)
 
     def touching(self, within=0.0):
         self.bare.geom_margin[:] = within

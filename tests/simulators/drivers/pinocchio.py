@@ -2,7 +2,6 @@
 
 import numpy as np
 import pinocchio
-
 from definition import Body, Limits, Reader, all_but
 
 from . import captured

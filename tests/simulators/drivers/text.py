@@ -7,7 +7,6 @@ import tempfile
 import xml.etree.ElementTree as ET
 
 import numpy as np
-
 from definition import Body, Limits, Reader, Unanswered, all_but
 
 FILES = {"URDF": "scene.urdf", "MJCF": "scene.xml", "glTF": "scene.glb", "USD": "scene.usda"}

@@ -10,9 +10,8 @@ import subprocess
 import tempfile
 
 import numpy as np
-from pxr import Usd, UsdGeom, UsdPhysics, UsdValidation
-
 from definition import Body, Limits, Reader, all_but, off
+from pxr import Usd, UsdGeom, UsdPhysics, UsdValidation
 
 from .text import FILES
 

@@ -4,7 +4,6 @@ import importlib.metadata
 
 import numpy as np
 import yourdfpy
-
 from definition import Limits, Reader, all_but
 
 from . import captured
