@@ -412,7 +412,8 @@ def point(number, title, format=None):
 
 
 def off(a, b):
-    return float(np.max(np.abs(np.asarray(a, float) - np.asarray(b, float))))
+    """Largest difference; what is not a number is infinitely far."""
+    return float(np.max(np.nan_to_num(np.abs(np.asarray(a, float) - np.asarray(b, float)), nan=math.inf)))
 
 
 @point(1, "loads without a word")

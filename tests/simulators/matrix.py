@@ -58,11 +58,13 @@ def readers(tools, paws):
 
 def answers(reader, twin, numbers=None):
     """What a reader answers to all points or some, and the simulator's version."""
+    points = [p for p in definition.POINTS if p.concerns(reader)]
     try:
         made = reader(twin)
+    except definition.Unanswered as why:
+        return [(p, "n.a.", [str(why)], []) for p in points], ""
     except Exception as error:
         reason = f"{type(error).__name__}: {str(error).strip()[:200]}"
-        points = [p for p in definition.POINTS if p.concerns(reader)]
         rows = [(p, *(("FAIL", [reason]) if p.number == 1 else ("n.a.", ["does not load"])), []) for p in points]
         return rows, ""
     return definition.evaluate(twin, made, numbers), str(getattr(made, "version", ""))
@@ -76,21 +78,10 @@ def examine(folder, tools, paws):
         began = time.perf_counter()
         found, version = answers(reader, twin)
         seconds = round(time.perf_counter() - began, 3)
-        where = {
-            "twin": twin.name,
-            "format": reader.format,
-            "simulator": reader.simulator,
-            "version": version,
-            "seconds": seconds,
-        }
-        for point, status, reasons, measured in found:
-            said = {
-                "point": point.number,
-                "status": status,
-                "reasons": reasons,
-                "measured": [vars(m) for m in measured],
-            }
-            rows.append(where | said)
+        where = {"twin": twin.name, "format": reader.format, "simulator": reader.simulator}
+        for point, status, why, measured in found:
+            said = {"point": point.number, "status": status, "reasons": why, "measured": [vars(m) for m in measured]}
+            rows.append(where | said | {"version": version, "seconds": seconds})
     return rows
 
 

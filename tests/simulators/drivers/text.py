@@ -43,15 +43,15 @@ PAWS = None
 
 
 def rewritten(twin, format):
-    """The file that `paws export` makes of twin.json is the file that `paws twin` wrote."""
+    """The files that `paws export` makes of twin.json are the files that `paws twin` wrote."""
     if PAWS is None:
         raise Unanswered("asked with --paws")
     with tempfile.TemporaryDirectory() as folder:
         command = [PAWS, "export", twin.folder, "--format", format.lower(), "--out", folder]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-        name = FILES[format]
-        if (pathlib.Path(folder) / name).read_bytes() != (twin.folder / name).read_bytes():
-            yield f"paws export writes another {name} than paws twin"
+        for again in sorted(pathlib.Path(folder).iterdir()):
+            if again.read_bytes() != (twin.folder / again.name).read_bytes():
+                yield f"paws export writes another {again.name} than paws twin"
 
 
 class Text(Reader):

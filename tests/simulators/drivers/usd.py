@@ -10,7 +10,7 @@ import subprocess
 import tempfile
 
 import numpy as np
-from definition import Body, Limits, Reader, all_but, off
+from definition import Body, Limits, Reader, Unanswered, all_but, off
 from pxr import Usd, UsdGeom, UsdPhysics, UsdValidation
 
 from .text import FILES
@@ -58,7 +58,7 @@ class UsdCore(Reader):
 
     def converted(self, twin, folder):
         if self.converter is None:
-            raise FileNotFoundError("no scene.usda and no urdf-usd-converter")
+            raise Unanswered("no scene.usda, and no urdf-usd-converter to make one")
         result = subprocess.run(
             [self.converter, "-c", CONVERT, twin.folder / FILES["URDF"], folder], capture_output=True, text=True
         )
