@@ -13,35 +13,36 @@ import tempfile
 
 import definition
 import matrix
-from drivers.text import FILES
+from drivers.text import model
 
-# (what, file, pattern, replacement, the point and the simulator that must notice)
+# (what, format, pattern, replacement, the point and the simulator that must notice)
 MUTATIONS = (
-    ("no limit", "scene.urdf", r"<limit [^>]*/>", "", 1, "check_urdf"),
-    ("upper limit in degrees", "scene.urdf", r'upper="([\d.]+)"', r'upper="57\1"', 15, "MuJoCo"),
-    ("no inertial", "scene.urdf", r"<inertial>.*?</inertial>", "", 3, "MuJoCo"),
-    ("inertia of the wrong part", "scene.urdf", r'ixx="', 'ixx="9', 3, "Pinocchio"),
+    ("no limit", "URDF", r"<limit [^>]*/>", "", 1, "check_urdf"),
+    ("upper limit in degrees", "URDF", r'upper="([\d.]+)"', r'upper="57\1"', 15, "MuJoCo"),
+    ("no inertial", "URDF", r"<inertial>.*?</inertial>", "", 3, "MuJoCo"),
+    ("inertia of the wrong part", "URDF", r'ixx="', 'ixx="9', 3, "Pinocchio"),
     (
         "axis the other way",
-        "scene.urdf",
+        "URDF",
         r'<axis xyz="(\S+) (\S+) (\S+)"',
         r'<axis xyz="-(\1) -(\2) -(\3)"',
         2,
         "Drake",
     ),
-    ("no friction", "scene.urdf", r'friction="[^"]*"', 'friction="0"', 15, "MuJoCo"),
-    ("bases fused", "scene.urdf", r"<mujoco>.*?</mujoco>", "", 4, "MuJoCo"),
-    ("much more damping", "scene.urdf", r'damping="([^"]*)"', r'damping="1\1"', 12, "Drake"),
-    ("free base", "scene.urdf", r'<link name="world">\s*</link>', '<link name="floor_1"/>', 4, "the text"),
-    ("fronts 5 mm too deep", "scene.urdf", "fronts", "deep", 11, "PyBullet"),
-    ("degrees", "scene.xml", r'angle="radian"', 'angle="degree"', 6, "the text"),
-    ("degrees", "scene.xml", r'angle="radian"', 'angle="degree"', 15, "MuJoCo"),
-    ("no excludes", "scene.xml", r"<exclude [^>]*/>", "", 6, "the text"),
-    ("no mass", "scene.xml", r"<inertial [^>]*/>", "", 3, "MuJoCo"),
-    ("no friction", "scene.xml", r'frictionloss="[^"]*"', "", 14, "MuJoCo"),
-    ("fronts 5 mm too deep", "scene.xml", "fronts", "deep", 11, "MuJoCo"),
-    ("no handle", "scene.xml", r'<site name="([^"]*)_handle"', r'<site name="\1_grip"', 5, "the text"),
-    ("not +Y up", "scene.glb", rb'"rotation":\[-0.70710\d*,0.0,0.0,', b'"rotation":[0.0,0.0,0.0,', 7, "three.js"),
+    ("no friction", "URDF", r'friction="[^"]*"', 'friction="0"', 15, "MuJoCo"),
+    ("bases fused", "URDF", r"<mujoco>.*?</mujoco>", "", 4, "MuJoCo"),
+    ("much more damping", "URDF", r'damping="([^"]*)"', r'damping="1\1"', 12, "Drake"),
+    ("free base", "URDF", r'<link name="world">\s*</link>', '<link name="floor_1"/>', 4, "the text"),
+    ("fronts 5 mm too deep", "URDF", "fronts", "deep", 11, "PyBullet"),
+    ("degrees", "MJCF", r'angle="radian"', 'angle="degree"', 6, "the text"),
+    ("degrees", "MJCF", r'angle="radian"', 'angle="degree"', 15, "MuJoCo"),
+    ("no excludes", "MJCF", r"<exclude [^>]*/>", "", 6, "the text"),
+    ("no mass", "MJCF", r"<inertial [^>]*/>", "", 3, "MuJoCo"),
+    ("no friction", "MJCF", r'frictionloss="[^"]*"', "", 14, "MuJoCo"),
+    ("fronts 5 mm too deep", "MJCF", "fronts", "deep", 11, "MuJoCo"),
+    ("handle elsewhere", "MJCF", r'(_handle" pos=")[^ ]*', r"\g<1>9", 9, "Drake"),
+    ("no handle", "MJCF", r'<site name="([^"]*)_handle"', r'<site name="\1_grip"', 5, "the text"),
+    ("not +Y up", "glTF", rb'"rotation":\[-0.70710\d*,0.0,0.0,', b'"rotation":[0.0,0.0,0.0,', 7, "three.js"),
 )
 
 
@@ -77,20 +78,21 @@ def main():
     tools = pathlib.Path(sys.prefix).parent
     readers = matrix.readers(tools, None)[0]
     missed = 0
-    for what, name, pattern, replacement, point, simulator in MUTATIONS:
+    for what, format, pattern, replacement, point, simulator in MUTATIONS:
         with tempfile.TemporaryDirectory() as folder:
             copy = pathlib.Path(folder) / "twin"
             shutil.copytree(source, copy)
             twin = definition.Twin(copy)
-            before = (copy / name).read_bytes()
-            (copy / name).write_bytes(broken(copy / name, pattern, replacement, twin))
-            assert (copy / name).read_bytes() != before, f"{what}: nothing to break in {name}"
-            reader = next(r for r in readers if r.simulator == simulator and FILES[r.format] == name)
+            file = model(twin, format)
+            before = file.read_bytes()
+            file.write_bytes(broken(file, pattern, replacement, twin))
+            assert file.read_bytes() != before, f"{what}: nothing to break in {file.name}"
+            reader = next(r for r in readers if (r.simulator, r.format) == (simulator, format))
             rows = matrix.answers(reader, twin, {1, point})[0]
-            reasons = [r for p, s, found, _ in rows if s == "FAIL" for r in found]
+            reasons = [r for _, status, found, _ in rows if status == "FAIL" for r in found]
             missed += not reasons
             said = reasons[0][:120] if reasons else "MISSED"
-            print(f"{what} in {name}: point {point}, {simulator}: {said}")
+            print(f"{what} in {file.name}: point {point}, {simulator}: {said}")
     return 1 if missed else 0
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from definition import Body, Engine, Limits
 
 from . import captured
-from .text import FILES
+from .text import FILES, Posed
 
 with captured():
     # It prints when it was built.
@@ -26,7 +26,7 @@ def matrix(quaternion):
     return np.array(bullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
 
 
-class Urdf(Engine):
+class Urdf(Posed, Engine):
     format, simulator, version = "URDF", "PyBullet", importlib.metadata.version("pybullet")
     has_friction = False
     cannot = {5: "the text answers it", 14: "does not simulate joint friction"}
@@ -76,13 +76,9 @@ class Urdf(Engine):
     def link_state(self, i):
         return bullet.getLinkState(self.kitchen, i, computeForwardKinematics=1, physicsClientId=self.world)
 
-    def handles(self, share):
-        self.put({p.name: share * p.upper for p in self.twin.parts})
-        at = {}
-        for p in self.twin.parts:
-            origin, turn = self.link_state(self.link[p.link])[4:6]
-            at[p.name] = np.array(origin) + matrix(turn) @ (p.handle - p.origin)
-        return at
+    def link_pose(self, link):
+        position, turn = self.link_state(self.link[link])[4:6]
+        return matrix(turn), np.array(position)
 
     def structure(self):
         if lost := set(self.twin.bodies) - set(self.link):

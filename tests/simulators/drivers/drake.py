@@ -13,7 +13,7 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, ExternallyAppli
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from .text import model
+from .text import Posed, model
 
 
 class Heard(logging.Handler):
@@ -29,7 +29,7 @@ logging.getLogger("drake").addHandler(Heard())
 logging.getLogger("drake").propagate = False
 
 
-class Drake(Engine):
+class Drake(Posed, Engine):
     simulator = "Drake"
     version = importlib.metadata.version("drake")
     has_friction = False
@@ -69,20 +69,14 @@ class Drake(Engine):
         for name in self.twin.bodies:
             link = self.plant.GetBodyByName(name)
             inertia = link.CalcSpatialInertiaInBodyFrame(self.context)
-            pose = self.plant.EvalBodyPoseInWorld(self.context, link)
-            turn = pose.rotation().matrix()
+            turn, position = self.link_pose(name)
             about = inertia.Shift(inertia.get_com()).CalcRotationalInertia().CopyToFullMatrix3()
-            read[name] = Body(inertia.get_mass(), pose @ inertia.get_com(), turn @ about @ turn.T)
+            read[name] = Body(inertia.get_mass(), position + turn @ inertia.get_com(), turn @ about @ turn.T)
         return read
 
-    def handles(self, share):
-        self.put({p.name: share * p.upper for p in self.twin.parts})
-        at = {}
-        for p in self.twin.parts:
-            at[p.name] = self.plant.EvalBodyPoseInWorld(self.context, self.plant.GetBodyByName(p.link)) @ (
-                p.handle - p.origin
-            )
-        return at
+    def link_pose(self, link):
+        pose = self.plant.EvalBodyPoseInWorld(self.context, self.plant.GetBodyByName(link))
+        return pose.rotation().matrix(), pose.translation()
 
     def structure(self):
         if self.plant.num_positions() != len(self.twin.parts):

@@ -5,10 +5,10 @@ import numpy as np
 from definition import Body, Engine, Limits
 
 from . import captured
-from .text import FILES
+from .text import FILES, Posed
 
 
-class MuJoCo(Engine):
+class MuJoCo(Posed, Engine):
     simulator = "MuJoCo"
     version = mujoco.__version__
 
@@ -26,9 +26,6 @@ class MuJoCo(Engine):
         self.armature = float(self.model.dof_armature.max(initial=0.0))
         self.joint = {self.model.joint(i).name: self.model.joint(i) for i in range(self.model.njnt)}
         self.link = {self.model.body(i).name: i for i in range(self.model.nbody)}
-        # World coordinates of the bodies when closed.
-        mujoco.mj_forward(self.model, self.data)
-        self.origin = self.data.xpos.copy()
 
     def again(self, step_secs):
         return type(self)(self.twin, step_secs)
@@ -54,15 +51,9 @@ class MuJoCo(Engine):
                 read[name] = Body(self.model.body_mass[i], self.data.xipos[i].copy(), inertia)
         return read
 
-    def handles(self, share):
-        self.put({p.name: share * p.upper for p in self.twin.parts})
-        at = {}
-        for p in self.twin.parts:
-            site = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_SITE, f"{p.name}_handle")
-            body = self.link[p.link]
-            rigid = self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ (p.handle - self.origin[body])
-            at[p.name] = self.data.site_xpos[site].copy() if site >= 0 else rigid
-        return at
+    def link_pose(self, link):
+        i = self.link[link]
+        return self.data.xmat[i].reshape(3, 3).copy(), self.data.xpos[i].copy()
 
     def structure(self):
         if lost := set(self.twin.bodies) - set(self.link):

@@ -5,10 +5,10 @@ import pinocchio
 from definition import Body, Limits, Reader, all_but
 
 from . import captured
-from .text import model
+from .text import Posed, model
 
 
-class Pinocchio(Reader):
+class Pinocchio(Posed, Reader):
     simulator, version = "Pinocchio", pinocchio.__version__
 
     def __init__(self, twin):
@@ -27,15 +27,15 @@ class Pinocchio(Reader):
             read[m.names[i]] = Limits(low, high, None, m.damping[v], m.upperDryFrictionLimit[v], effort, speed)
         return read
 
-    def pose(self, share):
+    def put(self, positions):
         q = pinocchio.neutral(self.model)
-        for p in self.twin.parts:
-            q[self.model.idx_qs[self.model.getJointId(p.name)]] = share * p.upper
+        for name, value in positions.items():
+            q[self.model.idx_qs[self.model.getJointId(name)]] = value
         pinocchio.framesForwardKinematics(self.model, self.data, q)
 
     def bodies(self):
         # Bases are melted into the universe: they are compared by their mass, in `structure`.
-        self.pose(0.0)
+        self.put({})
         read = {p.base: self.twin.bodies[p.base] for p in self.twin.parts}
         for p in self.twin.parts:
             i = self.model.getJointId(p.name)
@@ -45,12 +45,9 @@ class Pinocchio(Reader):
             )
         return read
 
-    def handles(self, share):
-        self.pose(0.0)
-        index = {p.name: self.model.getFrameId(p.link) for p in self.twin.parts}
-        local = {p.name: self.data.oMf[index[p.name]].actInv(p.handle) for p in self.twin.parts}
-        self.pose(share)
-        return {p.name: self.data.oMf[index[p.name]].act(local[p.name]) for p in self.twin.parts}
+    def link_pose(self, link):
+        pose = self.data.oMf[self.model.getFrameId(link)]
+        return pose.rotation.copy(), pose.translation.copy()
 
     def structure(self):
         if self.model.nq != len(self.twin.parts):

@@ -38,6 +38,31 @@ def model(twin, format):
     return path if included is None else path.parent / included.get("file")
 
 
+def handles_in_links(twin, format):
+    """Joint name -> where the file puts its handle in the frame of the moving link."""
+    root, found = parse(model(twin, format)), {}
+    for part in twin.parts:
+        if format == "MJCF":
+            site = root.find(f".//body[@name='{part.link}']/site[@name='{part.name}_handle']")
+            found[part.name] = numbers(site.get("pos"))
+        else:
+            shapes = root.iterfind(f"link[@name='{part.link}']/collision")
+            # The bar is the first of them.
+            bar = next(s for s in shapes if "handle" in s.get("name", ""))
+            found[part.name] = numbers(bar.find("origin").get("xyz"))
+    return found
+
+
+class Posed:
+    """A reader that can `put` joints and tell a `link_pose` (rotation, position) places the handles of its file."""
+
+    def handles(self, share):
+        local = handles_in_links(self.twin, self.format)
+        self.put({p.name: share * p.upper for p in self.twin.parts})
+        poses = {p.name: self.link_pose(p.link) for p in self.twin.parts}
+        return {name: position + rotation @ local[name] for name, (rotation, position) in poses.items()}
+
+
 # `paws` itself, where it is given: point 17 writes the files again.
 PAWS = None
 

@@ -7,10 +7,10 @@ import yourdfpy
 from definition import Limits, Reader, all_but
 
 from . import captured
-from .text import FILES
+from .text import FILES, Posed
 
 
-class Urdf(Reader):
+class Urdf(Posed, Reader):
     format, simulator, version = "URDF", "yourdfpy", importlib.metadata.version("yourdfpy")
     cannot = all_but({1, 2, 9, 15}, "kinematics only")
 
@@ -32,10 +32,12 @@ class Urdf(Reader):
             read[name] = Limits(float(limit.lower), float(limit.upper), np.array(joint.axis, float), *rest)
         return read
 
-    def handles(self, share):
-        self.robot.update_cfg({p.name: share * p.upper for p in self.twin.parts})
-        homogeneous = lambda p: np.append(p.handle - p.origin, 1.0)
-        return {p.name: (self.robot.get_transform(p.link) @ homogeneous(p))[:3] for p in self.twin.parts}
+    def put(self, positions):
+        self.robot.update_cfg(positions)
+
+    def link_pose(self, link):
+        pose = self.robot.get_transform(link)
+        return pose[:3, :3], pose[:3, 3]
 
 
 READERS = [Urdf]
