@@ -39,9 +39,10 @@ pub struct TwinArgs {
     words: WordsArgs,
 }
 
-const FILES: [FileNote; 11] = [
+const FILES: [FileNote; 12] = [
     FileNote { name: "scene.urdf", what: "the twin for ROS, PyBullet, Drake, Pinocchio, Isaac" },
     FileNote { name: "scene.xml", what: "the twin for MuJoCo, with floor, light and keyframes" },
+    FileNote { name: "kitchen.xml", what: "the same without floor and light, to include in a MuJoCo scene of your own" },
     FileNote { name: "scene.glb", what: "the twin for viewers and game engines, with an animation per joint" },
     FileNote { name: "index.html", what: "this page" },
     FileNote { name: "articulations.json", what: "every joint and every clip with its evidence" },
@@ -122,11 +123,10 @@ pub fn make(
     let validation = validation::validate(&twin, &as_hands(&hands), &recording.up(), &config.validation)?;
     steps.report("writing", 0, 1);
 
-    let verdicts: Vec<(String, String)> =
-        validation.joints.iter().map(|j| (j.id.clone(), j.verdict.word().to_owned())).collect();
-    let glb = export::gltf::write(&twin, &verdicts)?;
+    let glb = export::gltf::write(&twin, &validation.words())?;
     output.write("scene.urdf", export::urdf::write(&twin)?)?;
     output.write("scene.xml", export::mjcf::write(&twin)?)?;
+    output.write("kitchen.xml", export::mjcf::write_model(&twin)?)?;
     output.write("scene.glb", &glb)?;
     output.write("articulations.json", files::articulations(&scene, &reasoner)?)?;
     output.write("predictions.json", json::text(&files::predictions(&scene, &twin))?)?;

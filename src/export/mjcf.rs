@@ -16,27 +16,44 @@ fn list(values: &[f64]) -> String {
     values.iter().map(f64::to_string).collect::<Vec<_>>().join(" ")
 }
 
-/// The twin as an MJCF model with floor, light and keyframes `closed` and `open`.
+/// The body that holds all furniture: a scene can move the kitchen as one, and Pinocchio reads one root body only.
+pub(crate) const ROOT: &str = "kitchen";
+
+/// The twin as a scene: the furniture with floor and light, and keyframes `closed` and `open`.
 ///
 /// # Errors
 /// Where the twin cannot be a simulator's model (see [`super::check`]).
 pub fn write(twin: &Twin) -> Result<String> {
+    text(twin, true)
+}
+
+/// The furniture alone, to be included in a scene that has a floor and light of its own.
+///
+/// # Errors
+/// As [`write`].
+pub fn write_model(twin: &Twin) -> Result<String> {
+    text(twin, false)
+}
+
+fn text(twin: &Twin, with_room: bool) -> Result<String> {
     super::check(twin)?;
     let mut xml = Writer::new_with_indent(Cursor::new(Vec::new()), b' ', 2);
-    model(&mut xml, twin).map_err(|e| Error::Export(format!("MJCF: {e}")))?;
+    model(&mut xml, twin, with_room).map_err(|e| Error::Export(format!("MJCF: {e}")))?;
     let mut text = String::from_utf8(xml.into_inner().into_inner()).map_err(|e| Error::Export(format!("MJCF: {e}")))?;
     text.push('\n');
     Ok(text)
 }
 
-fn model(xml: &mut Xml, twin: &Twin) -> std::io::Result<()> {
+fn model(xml: &mut Xml, twin: &Twin, with_room: bool) -> std::io::Result<()> {
     xml.create_element("mujoco").with_attribute(("model", twin.name.as_str())).write_inner_content(|xml| {
         xml.create_element("compiler").with_attributes([("angle", "radian"), ("autolimits", "true")]).write_empty()?;
         xml.create_element("option").with_attribute(("integrator", "implicitfast")).write_empty()?;
-        xml.create_element("visual").write_inner_content(|xml| {
-            xml.create_element("headlight").with_attribute(("ambient", "0.4 0.4 0.4")).write_empty()?;
-            Ok(())
-        })?;
+        if with_room {
+            xml.create_element("visual").write_inner_content(|xml| {
+                xml.create_element("headlight").with_attribute(("ambient", "0.4 0.4 0.4")).write_empty()?;
+                Ok(())
+            })?;
+        }
         defaults(xml)?;
         xml.create_element("asset").write_inner_content(|xml| {
             for role in [Role::Front, Role::Handle, Role::Tray, Role::Carcass] {
@@ -46,7 +63,22 @@ fn model(xml: &mut Xml, twin: &Twin) -> std::io::Result<()> {
             }
             Ok(())
         })?;
-        worldbody(xml, twin)?;
+        xml.create_element("worldbody").write_inner_content(|xml| {
+            if with_room {
+                floor_and_light(xml, twin)?;
+            }
+            xml.create_element("body").with_attribute(("name", ROOT)).write_inner_content(|xml| {
+                for f in &twin.furniture {
+                    xml.create_element("body").with_attribute(("name", f.name.as_str())).write_inner_content(|xml| {
+                        inertial(xml, &f.carcass, &Point::origin(), twin.density_kg_per_m3)?;
+                        geoms(xml, &f.carcass, &Point::origin())?;
+                        part(xml, twin, f)
+                    })?;
+                }
+                Ok(())
+            })?;
+            Ok(())
+        })?;
         xml.create_element("contact").write_inner_content(|xml| {
             // MuJoCo keeps contacts between a body and a parent welded to the world: exactly a fixed cabinet.
             for f in &twin.furniture {
@@ -97,7 +129,7 @@ fn defaults(xml: &mut Xml) -> std::io::Result<()> {
     Ok(())
 }
 
-fn worldbody(xml: &mut Xml, twin: &Twin) -> std::io::Result<()> {
+fn floor_and_light(xml: &mut Xml, twin: &Twin) -> std::io::Result<()> {
     // Everywhere that anything can be: a dishwasher's door reaches below its furniture when it is open.
     let opened = |part: &crate::twin::Part| {
         let motions: Vec<_> =
@@ -116,28 +148,18 @@ fn worldbody(xml: &mut Xml, twin: &Twin) -> std::io::Result<()> {
     // The recording does not tell the floor: just under the lowest point.
     let floor = if low.is_finite() { low - 0.01 } else { 0.0 };
     let top = if high.is_finite() { high + 2.0 } else { 3.0 };
-    xml.create_element("worldbody").write_inner_content(|xml| {
-        xml.create_element("light")
-            .with_attributes([("pos", list(&[middle.x, middle.y, top]).as_str()), ("dir", "0 0 -1")])
-            .write_empty()?;
-        xml.create_element("geom")
-            .with_attributes([
-                ("name", "floor"),
-                ("type", "plane"),
-                ("pos", list(&[middle.x, middle.y, floor]).as_str()),
-                ("size", "5 5 0.1"),
-                ("rgba", "0.55 0.55 0.55 1"),
-            ])
-            .write_empty()?;
-        for f in &twin.furniture {
-            xml.create_element("body").with_attribute(("name", f.name.as_str())).write_inner_content(|xml| {
-                inertial(xml, &f.carcass, &Point::origin(), twin.density_kg_per_m3)?;
-                geoms(xml, &f.carcass, &Point::origin())?;
-                part(xml, twin, f)
-            })?;
-        }
-        Ok(())
-    })?;
+    xml.create_element("light")
+        .with_attributes([("pos", list(&[middle.x, middle.y, top]).as_str()), ("dir", "0 0 -1")])
+        .write_empty()?;
+    xml.create_element("geom")
+        .with_attributes([
+            ("name", "floor"),
+            ("type", "plane"),
+            ("pos", list(&[middle.x, middle.y, floor]).as_str()),
+            ("size", "5 5 0.1"),
+            ("rgba", "0.55 0.55 0.55 1"),
+        ])
+        .write_empty()?;
     Ok(())
 }
 

@@ -9,7 +9,7 @@ use crate::config;
 use crate::geometry::Face;
 use crate::geometry::moved::Rect;
 use crate::inference::observed_range;
-use crate::math::{Vector, any_orthogonal, unit};
+use crate::math::{Vector, any_orthogonal, reject, unit};
 use crate::pipeline::{Scene, SceneJoint};
 use crate::twin::{Furniture, Joint, LeftOut, OrientedBox, Part, Role, Solid, Twin};
 
@@ -18,6 +18,12 @@ const HANDLE_STANDOFF_M: f64 = 0.035;
 const HANDLE_HALF_M: f64 = 0.006;
 /// Half-length of a handle's bar.
 const HANDLE_BAR_HALF_M: f64 = 0.06;
+
+/// A direction nearer than this to upright or level is meant to be so, degrees.
+const LEVEL_DEG: f64 = 5.0;
+/// A leaf that hangs turns about a line this far behind its middle, so that its weight shuts it, metres. Its upper front
+/// corner then rises by half a board: the piece ends that much lower than its hinge was seen.
+const HUNG_M: f64 = 0.002;
 
 /// A joint with its face and the rectangle of its part, ready to be built.
 #[derive(Debug, Clone)]
@@ -103,15 +109,23 @@ fn shrunk(plan: &Plan, share: f64) -> Rect {
 
 /// Face, rectangle and the joint moved onto them.
 fn plan<'a>(scene: &Scene, joint: &'a SceneJoint, up: &Vector, config: &config::Fitting) -> Plan<'a> {
-    let face = joint.face.unwrap_or_else(|| assumed_face(joint, up));
-    let (rect, seen) = rectangle(joint, &face);
+    let seen_face = joint.face.filter(|f| is_front_of(f, joint, up)).unwrap_or_else(|| assumed_face(joint, up));
+    let face = levelled(&seen_face, up);
     let mut articulation = joint.joint;
+    articulation.axis = squared(&articulation.axis, &face, up);
     if articulation.kind == JointKind::Revolute {
-        // The hinge runs along the front edge of the leaf or just before it: about an axis behind it the leaf's edge would
-        // swing into its neighbour.
-        let [r, u, h] = face.coordinates(&articulation.origin);
-        articulation.origin = face.point(r, u, h.clamp(0.0, config.board_m));
+        let [r, u, h] = seen_face.coordinates(&articulation.origin);
+        let level = articulation.axis.dot(&face.up).abs() < articulation.axis.dot(&face.right).abs();
+        let (u, h) = if level && u > 0.0 && !face.is_horizontal(up) {
+            (u - 0.5 * config.board_m - config.clearance_m, -0.5 * config.board_m - HUNG_M)
+        } else {
+            // The hinge runs along the front edge of the leaf or just before it: about an axis behind it the leaf's edge
+            // would swing into its neighbour.
+            (u, h.clamp(0.0, config.board_m))
+        };
+        articulation.origin = face.point(r, u, h);
     }
+    let (rect, seen) = rectangle(joint, &articulation, &face);
     let observed = scene
         .clips
         .iter()
@@ -123,6 +137,46 @@ fn plan<'a>(scene: &Scene, joint: &'a SceneJoint, up: &Vector, config: &config::
     Plan { joint, observed, articulation, face, rect, seen }
 }
 
+/// Whether a face can be the front of what moves: a drawer is not pulled along a lid or a worktop.
+fn is_front_of(face: &Face, joint: &SceneJoint, up: &Vector) -> bool {
+    joint.joint.kind == JointKind::Revolute
+        || joint.joint.axis.dot(&face.normal).abs() > 0.5
+        || !face.is_horizontal(up)
+}
+
+/// A direction made upright or level where it nearly is: gravity opens a door whose hinge leans by a thousandth of a radian,
+/// where a simulator has no friction to hold it.
+fn plumb(direction: &Vector, up: &Vector) -> Vector {
+    let along = direction.dot(up);
+    let near = LEVEL_DEG.to_radians();
+    if along.abs() > near.cos() {
+        *up * along.signum()
+    } else if along.abs() < near.sin() {
+        unit(&reject(direction, up)).unwrap_or(*direction)
+    } else {
+        *direction
+    }
+}
+
+/// A face with its own axes plumb, turned about its centre.
+fn levelled(face: &Face, up: &Vector) -> Face {
+    let normal = plumb(&face.normal, up);
+    match unit(&reject(&plumb(&face.up, up), &normal)) {
+        Some(face_up) => Face { right: face_up.cross(&normal), up: face_up, normal, ..*face },
+        None => *face,
+    }
+}
+
+/// A joint's axis: the direction of the face that it nearly has, else itself made plumb.
+fn squared(axis: &Vector, face: &Face, up: &Vector) -> Vector {
+    let near = LEVEL_DEG.to_radians().cos();
+    [face.right, face.up, face.normal]
+        .into_iter()
+        .flat_map(|d| [d, -d])
+        .find(|d| d.dot(axis) > near)
+        .unwrap_or_else(|| plumb(axis, up))
+}
+
 /// Without a face in the images the motion of the grip tells which way the front looks.
 fn assumed_face(joint: &SceneJoint, up: &Vector) -> Face {
     let normal = match joint.joint.kind {
@@ -130,7 +184,7 @@ fn assumed_face(joint: &SceneJoint, up: &Vector) -> Face {
         JointKind::Revolute => unit(&joint.joint.axis.cross(&(joint.grip - joint.joint.origin)))
             .unwrap_or_else(|| any_orthogonal(&joint.joint.axis)),
     };
-    let face_up = unit(&crate::math::reject(up, &normal)).unwrap_or_else(|| any_orthogonal(&normal));
+    let face_up = unit(&reject(up, &normal)).unwrap_or_else(|| any_orthogonal(&normal));
     Face {
         center: joint.grip - normal * HANDLE_STANDOFF_M,
         right: face_up.cross(&normal),
@@ -142,7 +196,7 @@ fn assumed_face(joint: &SceneJoint, up: &Vector) -> Face {
 }
 
 /// The part's rectangle: what was seen to move, brought to the hinge; else what the grip and the hinge suggest.
-fn rectangle(joint: &SceneJoint, face: &Face) -> (Rect, bool) {
+fn rectangle(joint: &SceneJoint, articulation: &Articulation, face: &Face) -> (Rect, bool) {
     // Handles stand a few centimetres from the free edge.
     const RIM_M: f64 = 0.05;
     const MIN_M: f64 = 0.1;
@@ -155,9 +209,9 @@ fn rectangle(joint: &SceneJoint, face: &Face) -> (Rect, bool) {
         },
         |r| r.bounds,
     );
-    if joint.joint.kind == JointKind::Revolute {
-        let [r, u, _] = face.coordinates(&joint.joint.origin);
-        let upright = joint.joint.axis.dot(&face.up).abs() >= joint.joint.axis.dot(&face.right).abs();
+    if articulation.kind == JointKind::Revolute {
+        let [r, u, _] = face.coordinates(&articulation.origin);
+        let upright = articulation.axis.dot(&face.up).abs() >= articulation.axis.dot(&face.right).abs();
         let (axis, at) = if upright { (0, r) } else { (1, u) };
         // The hinge is one edge of the leaf, the grip is near the other.
         if at < 0.0 {
@@ -225,6 +279,10 @@ fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
             solids.push(solid("tray_back", Role::Tray, [between, above, [tray[0], tray[0] + thin]], false));
         }
         upper = upper.min(tray[1] - tray[0]);
+    } else if slide {
+        // A sliding door stays in its frame.
+        let axis = plan.articulation.axis;
+        upper = upper.min(axis.dot(&face.right).abs() * (r[1] - r[0]) + axis.dot(&face.up).abs() * (u[1] - u[0]));
     }
     let deep = carcass_out[0];
     let between_r = [r[0] + board, r[1] - board];
@@ -389,5 +447,33 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn what_nearly_stands_upright_does() {
+        let mut leaning = scene_joint(JointKind::Revolute);
+        let tilt = crate::math::rotation(&Vector::y(), 0.02);
+        let face = leaning.face.as_mut().unwrap();
+        (face.right, face.up, face.normal) = (tilt * face.right, tilt * face.up, tilt * face.normal);
+        leaning.joint.axis = tilt * leaning.joint.axis;
+        let part = &twin(vec![leaning]).furniture[0].part;
+        assert_eq!(part.joint.articulation.axis, -Vector::z());
+        assert_eq!(part.solids[0].shape.rotation.column(1).into_owned(), Vector::z());
+        assert!((part.handle - Point::new(0.2, -0.035, 0.8)).norm() < 2e-3);
+    }
+
+    #[test]
+    fn the_weight_of_a_leaf_that_hangs_shuts_it() {
+        let mut flap = scene_joint(JointKind::Revolute);
+        flap.joint.axis = Vector::x();
+        flap.joint.origin = Point::new(0.2, 0.0, 1.2);
+        let twin = twin(vec![flap]);
+        let part = &twin.furniture[0].part;
+        let mass = crate::twin::mass_properties(&part.solids, twin.density_kg_per_m3).unwrap();
+        let phi = part.joint.articulation;
+        // The sense in which the axis opens lifts the handle out of the front.
+        let opens = phi.axis.cross(&(part.handle - phi.origin)).dot(&-Vector::y()).signum();
+        let weight = phi.axis.dot(&(mass.center - phi.origin).cross(&(-Vector::z() * mass.mass)));
+        assert!(opens * weight < 0.0, "{opens} {weight}");
     }
 }

@@ -89,6 +89,14 @@ pub struct Validation {
     pub joints: Vec<JointCheck>,
 }
 
+impl Validation {
+    /// (joint, verdict in a word), as the scene's files carry them.
+    #[must_use]
+    pub fn words(&self) -> Vec<(String, String)> {
+        self.joints.iter().map(|j| (j.id.clone(), j.verdict.word().to_owned())).collect()
+    }
+}
+
 /// A clip's hand for a joint: (clip name, trajectory).
 pub type Hands<'a> = Vec<(String, &'a Trajectory)>;
 
