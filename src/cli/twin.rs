@@ -42,7 +42,10 @@ pub struct TwinArgs {
 const FILES: [FileNote; 12] = [
     FileNote { name: "scene.urdf", what: "the twin for ROS, PyBullet, Drake, Pinocchio, Isaac" },
     FileNote { name: "scene.xml", what: "the twin for MuJoCo, with floor, light and keyframes" },
-    FileNote { name: "kitchen.xml", what: "the same without floor and light, to include in a MuJoCo scene of your own" },
+    FileNote {
+        name: "kitchen.xml",
+        what: "the same without floor and light, to include in a MuJoCo scene of your own",
+    },
     FileNote { name: "scene.glb", what: "the twin for viewers and game engines, with an animation per joint" },
     FileNote { name: "index.html", what: "this page" },
     FileNote { name: "articulations.json", what: "every joint and every clip with its evidence" },

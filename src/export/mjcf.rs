@@ -69,11 +69,13 @@ fn model(xml: &mut Xml, twin: &Twin, with_room: bool) -> std::io::Result<()> {
             }
             xml.create_element("body").with_attribute(("name", ROOT)).write_inner_content(|xml| {
                 for f in &twin.furniture {
-                    xml.create_element("body").with_attribute(("name", f.name.as_str())).write_inner_content(|xml| {
-                        inertial(xml, &f.carcass, &Point::origin(), twin.density_kg_per_m3)?;
-                        geoms(xml, &f.carcass, &Point::origin())?;
-                        part(xml, twin, f)
-                    })?;
+                    xml.create_element("body").with_attribute(("name", f.name.as_str())).write_inner_content(
+                        |xml| {
+                            inertial(xml, &f.carcass, &Point::origin(), twin.density_kg_per_m3)?;
+                            geoms(xml, &f.carcass, &Point::origin())?;
+                            part(xml, twin, f)
+                        },
+                    )?;
                 }
                 Ok(())
             })?;

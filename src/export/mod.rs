@@ -52,7 +52,8 @@ pub fn check(twin: &Twin) -> Result<()> {
         return fault("the twin's name has control characters".to_owned());
     }
     // Names that the formats add must not be taken either.
-    let mut names: std::collections::BTreeSet<String> = ["world", "floor", "scene", mjcf::ROOT].map(str::to_owned).into();
+    let mut names: std::collections::BTreeSet<String> =
+        ["world", "floor", "scene", mjcf::ROOT].map(str::to_owned).into();
     for f in &twin.furniture {
         let id = &f.part.id;
         let derived = [format!("{}_fixed", f.name), format!("{id}_link"), format!("{id}_handle")];

@@ -139,9 +139,7 @@ fn plan<'a>(scene: &Scene, joint: &'a SceneJoint, up: &Vector, config: &config::
 
 /// Whether a face can be the front of what moves: a drawer is not pulled along a lid or a worktop.
 fn is_front_of(face: &Face, joint: &SceneJoint, up: &Vector) -> bool {
-    joint.joint.kind == JointKind::Revolute
-        || joint.joint.axis.dot(&face.normal).abs() > 0.5
-        || !face.is_horizontal(up)
+    joint.joint.kind == JointKind::Revolute || joint.joint.axis.dot(&face.normal).abs() > 0.5 || !face.is_horizontal(up)
 }
 
 /// A direction made upright or level where it nearly is: gravity opens a door whose hinge leans by a thousandth of a radian,

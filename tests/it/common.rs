@@ -110,14 +110,18 @@ pub fn skipped(why: &str) {
     let _ = writeln!(std::io::stderr(), "skipped: {why}");
 }
 
+/// Whether a check that cannot run is a failure.
+pub fn required() -> bool {
+    ["CI", "PAWS_REQUIRE_SIMULATORS"].iter().any(|v| std::env::var_os(v).is_some_and(|x| !x.is_empty()))
+}
+
 /// Python with what `tests/NAME/requirements.txt` asks for, in an environment of the tests' own, made on first use.
 ///
 /// `None`, and a word, where there is no Python 3 or no PyPI; there `CI` or `PAWS_REQUIRE_SIMULATORS` make it a failure.
 pub fn python(name: &str) -> Option<PathBuf> {
-    let required = ["CI", "PAWS_REQUIRE_SIMULATORS"].iter().any(|v| std::env::var_os(v).is_some_and(|x| !x.is_empty()));
     match environment(name) {
         Ok(python) => Some(python),
-        Err(reason) if required => panic!("the checks of tests/{name} cannot run: {reason}"),
+        Err(reason) if required() => panic!("the checks of tests/{name} cannot run: {reason}"),
         Err(reason) => {
             skipped(&format!("the checks of tests/{name} need python3 and PyPI ({reason})"));
             None

@@ -1,23 +1,55 @@
-//! The exported files in the simulators that people use: installed from PyPI into an environment of the tests' own.
+//! The exported files in the simulators that people use: `tests/simulators`, installed into an environment of their own.
 //!
-//! Without Python 3 or without a network the test says so and is skipped, except where `CI` or `PAWS_REQUIRE_SIMULATORS`
-//! is set: there a check that cannot run is a failure.
+//! What cannot be installed (no Python 3, no npm, no network) is said and left out, except where `CI` or
+//! `PAWS_REQUIRE_SIMULATORS` is set: there a check that cannot run is a failure.
 
-use std::path::Path;
-use std::process::Command;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
 
 use paws_twin::synth::{Options, Tier};
 
-use crate::common::{optional_data, paws, python, record, stderr};
+use crate::common::{optional_data, paws, record, required, skipped, stderr};
+
+fn script(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/simulators").join(name)
+}
+
+fn text(out: &Output) -> String {
+    format!("{}{}", String::from_utf8_lossy(&out.stdout), String::from_utf8_lossy(&out.stderr))
+}
+
+/// The Python of the simulators' environment, made on first use; `None` where there is none and none is required.
+fn python() -> Option<PathBuf> {
+    let home = Path::new(env!("CARGO_TARGET_TMPDIR")).join("simulators");
+    let mut install = Command::new("python3");
+    install.arg(script("install.py")).arg(&home);
+    if required() {
+        install.arg("--require");
+    }
+    let words = match install.output() {
+        Ok(out) if out.status.success() => text(&out),
+        Ok(out) => format!("{}cannot run", text(&out)),
+        Err(e) => format!("python3: {e}: cannot run"),
+    };
+    let python = home.join("python/bin/python");
+    if words.contains("cannot run") {
+        assert!(!required(), "the simulator checks cannot run: {words}");
+        skipped(&format!("some simulator checks need Python 3, PyPI, npm and Debian's packages: {words}"));
+    }
+    // The core of the checks is Python's; without it nothing can be asked.
+    home.join("python.installed").exists().then_some(python)
+}
 
 #[test]
-fn mujoco_loads_both_files_and_every_joint_rests_opens_and_closes() {
-    let Some(python) = python("simulators") else { return };
+fn twins_are_ready_for_every_simulator() {
+    let Some(python) = python() else { return };
     let dir = tempfile::tempdir().unwrap();
     let mut folders = Vec::new();
-    for (seed, tier) in [(21, Tier::Clean), (22, Tier::Realistic)] {
+    for (seed, tier, parts) in
+        [(21, Tier::Clean, 5), (22, Tier::Realistic, 5), (23, Tier::Clean, 1), (24, Tier::Hard, 6)]
+    {
         let name = format!("kitchen_{seed}");
-        record(&Options { seed, tier, width: 240, parts: 5 }, &dir.path().join(&name));
+        record(&Options { seed, tier, width: 240, parts }, &dir.path().join(&name));
         folders.push((name.clone(), dir.path().join(name)));
     }
     if let Some(root) = optional_data("recordings") {
@@ -32,10 +64,16 @@ fn mujoco_loads_both_files_and_every_joint_rests_opens_and_closes() {
         assert_ne!(result.status.code(), Some(2), "{name}: {}", stderr(&result));
         twins.push(out);
     }
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/simulators/check_mujoco.py");
-    let out = Command::new(python).arg(script).args(&twins).current_dir(dir.path()).output().unwrap();
-    let text = format!("{}{}", String::from_utf8_lossy(&out.stdout), String::from_utf8_lossy(&out.stderr));
-    eprintln!("{text}");
-    assert!(out.status.success(), "{text}");
-    assert_eq!(text.matches(" ok ").count(), 2 * twins.len(), "every twin is checked in two formats");
+    let mut matrix = Command::new(&python);
+    matrix.arg(script("matrix.py")).args(&twins).args(["--paws", env!("CARGO_BIN_EXE_paws")]).current_dir(dir.path());
+    if required() {
+        matrix.arg("--require");
+    }
+    let matrix = matrix.output().unwrap();
+    eprintln!("{}", text(&matrix));
+    assert!(matrix.status.success(), "{}", text(&matrix));
+    // Checks that never fail are worth nothing: faults put into the files must be noticed.
+    let faults =
+        Command::new(&python).arg(script("mutations.py")).arg(&twins[0]).current_dir(dir.path()).output().unwrap();
+    assert!(faults.status.success(), "{}", text(&faults));
 }
