@@ -41,6 +41,16 @@ pub enum ManhattanMethod {
     Gravity,
 }
 
+/// How a joint is chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum InferenceMethod {
+    /// The paper's: type from words, direction of the room, line of least variance.
+    Paper,
+    /// Ours: all hypotheses weighed by hand, depth, shape and words.
+    Posterior,
+}
+
 /// Which set of values the others start from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -195,6 +205,9 @@ block! {
 block! {
     /// Trajectory and geometry to a joint (§3.4, §A.7, §C.2).
     Inference, "inference", {
+        /// How a joint is chosen: "paper" (type from words, slide along a direction of the room, hinge at the line of least
+        /// variance) or "posterior" (all hypotheses weighed by hand, depth, shape and words).
+        method: InferenceMethod = InferenceMethod::Posterior, "-", "ours";
         /// Tolerance of the torus test as a share of the mean radius.
         torus_tolerance_ratio: f64 = 0.15, "share", "B.1";
         /// Least torus tolerance.
@@ -323,7 +336,9 @@ impl Config {
         config.geometry.depth_scale = false;
         config.geometry.lines = LineMethod::Unprojected;
         config.geometry.manhattan = ManhattanMethod::Clustered;
+        config.inference.method = InferenceMethod::Paper;
         config.inference.use_face_normal = false;
+        config.inference.merge_clips = false;
         config
     }
 

@@ -7,7 +7,7 @@ use clap::Args;
 use super::output::write_file;
 use super::progress::Steps;
 use super::{Answer, ConfigFile, print};
-use crate::evaluation::stages::{SceneTruth, Stages, measure};
+use crate::evaluation::stages::{SceneTruth, Stages, measure, measure_segments};
 use crate::geometry::segments::Lsd;
 use crate::json;
 use crate::math::stats;
@@ -44,7 +44,8 @@ pub fn run(args: &MeasureArgs) -> anyhow::Result<Answer> {
         steps.report("measuring", i, opened.len());
         let reasoner = Geometric { reasoning: config.reasoning.clone(), inference: config.inference.clone() };
         let scene = pipeline::infer(recording, &config, &Lsd, &reasoner, &|_, _, _| {})?;
-        let stages = measure(&scene, truth);
+        let mut stages = measure(&scene, truth);
+        measure_segments(recording, truth, &Lsd, &mut stages)?;
         if args.each {
             rows.push(row(&recording.name, &stages));
         }
@@ -59,10 +60,11 @@ pub fn run(args: &MeasureArgs) -> anyhow::Result<Answer> {
     Ok(Answer::Yes)
 }
 
-const HEADER: [&str; 10] = [
+const HEADER: [&str; 11] = [
     "recordings",
     "clips",
     "localised",
+    "2D edges seen",
     "hinge line off by",
     "and by",
     "recall 3°, 3 cm",
@@ -80,6 +82,7 @@ fn row(name: &str, s: &Stages) -> Vec<String> {
         name.to_owned(),
         s.clips.to_string(),
         s.localized.to_string(),
+        share(s.edges_seen()),
         best.map_or("-".to_owned(), |b| format!("{:.1} cm", 100.0 * b[0])),
         best.map_or("-".to_owned(), |b| format!("{:.2}°", b[1].to_degrees())),
         share(s.recall()),

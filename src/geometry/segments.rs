@@ -32,6 +32,16 @@ impl Segment2 {
         [0, 1].map(|k| self.a[k] + (self.b[k] - self.a[k]) * t)
     }
 
+    /// Distance of a point, pixels; beyond the ends it is that of the end.
+    #[must_use]
+    pub fn distance(&self, p: [f64; 2]) -> f64 {
+        let [du, dv] = [self.b[0] - self.a[0], self.b[1] - self.a[1]];
+        let along = (p[0] - self.a[0]) * du + (p[1] - self.a[1]) * dv;
+        let t = (along / (du * du + dv * dv).max(1e-12)).clamp(0.0, 1.0);
+        let foot = self.at(t);
+        (p[0] - foot[0]).hypot(p[1] - foot[1])
+    }
+
     /// Unit vector across the segment.
     #[must_use]
     pub fn across(&self) -> [f64; 2] {

@@ -2,6 +2,7 @@
 
 pub mod aggregate;
 pub mod bare;
+pub mod paper;
 
 use serde::{Deserialize, Serialize};
 

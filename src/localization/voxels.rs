@@ -42,7 +42,8 @@ const BITS: u32 = 21;
 const OFFSET: i64 = 1 << (BITS - 1);
 
 fn pack(p: &Point, scale: f64) -> u64 {
-    let axis = |c: f64| ((c * scale).floor() as i64 + OFFSET).clamp(0, (1 << BITS) - 1) as u64;
+    // Above zero truncation is the floor, without a call.
+    let axis = |c: f64| u64::from(((c * scale + OFFSET as f64) as u32).min((1 << BITS) - 1));
     axis(p.x) << (2 * BITS) | axis(p.y) << BITS | axis(p.z)
 }
 
@@ -77,7 +78,7 @@ impl Table {
 
     fn slot(&mut self, key: u64) -> &mut Slot {
         let mask = self.slots.len() - 1;
-        let mut at = self.home(key);
+        let mut at = self.home(key) & mask;
         while self.slots[at].key != key && self.slots[at].key != Self::EMPTY {
             at = (at + 1) & mask;
         }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{ClipResult, Looks};
 use crate::articulation::Outcome;
-use crate::config::{Config, LineMethod};
+use crate::config::{Config, InferenceMethod, LineMethod};
 use crate::error::Result;
 use crate::geometry::moved::{self, Rect};
 use crate::geometry::segments::LiftedSegment;
@@ -141,7 +141,8 @@ pub(super) fn infer(
     }
     result.candidates = candidates::collect(
         &candidates::Evidence {
-            face: result.face.as_ref(),
+            // The paper knows no face: its lines and directions stay as they are.
+            face: result.face.as_ref().filter(|_| config.inference.method == InferenceMethod::Posterior),
             rect: result.part.as_ref(),
             tracks: &result.lines,
             surface: &surface,
@@ -153,7 +154,10 @@ pub(super) fn infer(
         &config.inference,
     );
     let paths = [path.clone()];
-    result.candidates = result.candidates.iter().map(|c| candidates::settled(c, &paths, &config.reasoning)).collect();
+    if config.inference.method == InferenceMethod::Posterior {
+        result.candidates =
+            result.candidates.iter().map(|c| candidates::settled(c, &paths, &config.reasoning)).collect();
+    }
     let agreement: Vec<(f64, usize)> = result
         .candidates
         .iter()
@@ -173,14 +177,15 @@ pub(super) fn infer(
         agreement: &agreement,
         part: result.part.as_ref().map(part_shape),
     });
-    result.joint = inference::infer(
-        trajectory,
-        &result.candidates,
-        &answer,
-        result.face.as_ref(),
-        &config.reasoning,
-        &config.inference,
-    );
+    let face = result.face.as_ref();
+    result.joint = match config.inference.method {
+        InferenceMethod::Paper => {
+            inference::paper::infer(trajectory, &result.candidates, answer.words_log_odds, face, &config.inference)
+        }
+        InferenceMethod::Posterior => {
+            inference::infer(trajectory, &result.candidates, &answer, face, &config.reasoning, &config.inference)
+        }
+    };
     // With the joint known, the part is also seen where the joint puts it: the rectangle again, from all evidence.
     if let (Some(face), Outcome::Found(joint)) = (&result.face, &result.joint) {
         let votes = moved::vote(face, &surface, &open, Some((&joint.joint, &region.grip)), &config.fitting);
