@@ -15,7 +15,7 @@ import subprocess
 import sys
 import tempfile
 
-# Our bench, the peer's script with its size, and how many items of the peer's input ours works on (None: all).
+# Our bench, and the peer's script with its size.
 STAGES = [
     ("voxel_views", ["peer_voxel.py"]),
     ("voxel_views_10m", ["peer_voxel.py", "--points", "10000000"]),
@@ -23,7 +23,7 @@ STAGES = [
     ("view_select_100k", ["peer_views.py", "--frames", "100000"]),
     ("lsd", ["peer_lsd.py"]),
     ("lsd_456", ["peer_lsd.py", "--res", "456x256", "--views", "50"]),
-    ("kalman_rts", ["peer_kalman.py"]),
+    ("kalman_rts", ["peer_kalman.py", "--clips", "2000"]),
     ("normals_manhattan", ["peer_normals.py", "--res", "456x256", "--views", "50", "--sample", "20000"]),
     ("lines3d_ransac", ["peer_lines3d.py", "--part", "ransac", "--max-tracks", "30"]),
 ]

@@ -1,4 +1,4 @@
-//! Accuracy with a simulated language model that errs: a table over synthetic kitchens.
+//! Accuracy with a simulated language model that errs: a table over synthetic kitchens, our method beside the paper's.
 //!
 //! `cargo run --release --example words -- [clean|realistic|hard] [first seed] [kitchens]`
 
@@ -39,19 +39,22 @@ fn main() -> Result<(), Failure> {
         render(&Options { seed, tier, width: 320, parts: 6 }, &folder)?;
         folders.push(folder);
     }
-    let config = Config::default();
-    let geometric = Geometric { reasoning: config.reasoning.clone(), inference: config.inference.clone() };
-    println!("| model | type (M) | and axis (MA) | and origin (MAO) |\n| --- | --- | --- | --- |");
-    println!("| none | {} |", row(&folders, &config, |_| Ok(Box::new(geometric.clone())))?);
+    let configs = [Config::default(), Config::paper()];
+    let geometric = Geometric { reasoning: configs[0].reasoning.clone(), inference: configs[0].inference.clone() };
+    println!("| model | ours: M | MA | MAO | paper: M | MA | MAO |\n| --- | --- | --- | --- | --- | --- | --- |");
+    let none = |config: &Config| row(&folders, config, |_| Ok(Box::new(geometric.clone())));
+    println!("| none | {} | {} |", none(&configs[0])?, none(&configs[1])?);
     let random = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5]
         .map(|e| (format!("{:.0} % wrong", 100.0 * e), Errors::Random { kind: e, line: e }));
     let always =
         [JointKind::Revolute, JointKind::Prismatic].map(|k| (format!("always {}", k.word()), Errors::Always(k)));
     for (name, errors) in random.into_iter().chain(always) {
-        let shares = row(&folders, &config, |folder| {
-            Ok(Box::new(Simulated { geometric: &geometric, truth: joints(folder)?, errors, seed: 1 }))
-        })?;
-        println!("| {name} | {shares} |");
+        let shares = |config: &Config| {
+            row(&folders, config, |folder| {
+                Ok(Box::new(Simulated { geometric: &geometric, truth: joints(folder)?, errors, seed: 1 }))
+            })
+        };
+        println!("| {name} | {} | {} |", shares(&configs[0])?, shares(&configs[1])?);
     }
     Ok(())
 }

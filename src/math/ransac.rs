@@ -15,13 +15,16 @@ pub struct Consensus<M> {
 /// How a search is run.
 #[derive(Debug, Clone, Copy)]
 pub struct Search {
-    /// Random minimal samples drawn.
+    /// Random minimal samples drawn at the most.
     pub draws: usize,
     /// A datum within this distance is an inlier (the unit is the distance function's).
     pub tolerance: f64,
     /// Seed of the draws: the same data and seed give the same answer.
     pub seed: u64,
 }
+
+/// Probability of having drawn a sample without outliers at which a search ends early.
+const CONFIDENCE: f64 = 0.9999;
 
 /// Draws minimal samples of `K` data, keeps the model of the lowest truncated squared distance, and refits each new best
 /// on its inliers until that no longer helps.
@@ -45,7 +48,10 @@ pub fn lo_ransac<M: Clone, const K: usize>(
 
     let mut rng = Pcg64Mcg::seed_from_u64(search.seed);
     let mut best: Option<(f64, M)> = None;
-    for _ in 0..search.draws {
+    let mut needed = search.draws;
+    let mut draw = 0;
+    while draw < needed {
+        draw += 1;
         let mut sample = [0usize; K];
         for k in 0..K {
             loop {
@@ -70,6 +76,10 @@ pub fn lo_ransac<M: Clone, const K: usize>(
             }
             (score, model) = (refined_score, refined);
         }
+        let share = inliers(&model).len() as f64 / count as f64;
+        // So many draws hold a sample without an outlier with the wanted probability: more would find the same model.
+        let clean = share.powi(K as i32).min(1.0 - 1e-12);
+        needed = needed.min(((1.0 - CONFIDENCE).ln() / (1.0 - clean).ln()).ceil().max(1.0) as usize);
         best = Some((score, model));
     }
     best.map(|(_, model)| {
