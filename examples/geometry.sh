@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # The steps before the joint inference, ours and the paper's, on synthetic kitchens with a known answer.
 #   examples/geometry.sh [first seed] [kitchens]
-# About four minutes on two cores.
+# About five minutes on two cores, most of it for rendering.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-first=${1:-1001} count=${2:-6}
+first=${1:-1001} count=${2:-3}
 cargo build --release --quiet
 paws=$PWD/target/release/paws
 work=$(mktemp -d)
