@@ -256,8 +256,6 @@ const DETECTION_STD_PX: f64 = 1.0;
 const POSE_STD_M: f64 = 0.004;
 /// Standard deviation of depth along the ray, as a share of the distance, once its scale is corrected.
 const DEPTH_STD: f64 = 0.03;
-/// How many views' depths are independent at the most.
-const INDEPENDENT_DEPTHS: f64 = 3.0;
 
 /// What one view says about a line.
 struct Sight {
@@ -299,8 +297,6 @@ impl Sight {
 /// Least squares over some sights: the line and its information matrices (position, direction).
 fn common_line(sights: &[Sight], ids: &[usize]) -> Option<(Line, [Matrix3<f64>; 2])> {
     let first = ids.iter().map(|&i| &sights[i]).min_by(|a, b| a.std[1].total_cmp(&b.std[1]))?;
-    // The views' depth errors are alike (one estimator, one scale): all of them are worth a few.
-    let shared = (ids.len() as f64 / INDEPENDENT_DEPTHS).max(1.0);
     let mut position = Matrix3::zeros();
     let mut turning = Matrix3::zeros();
     let mut pull = Vector::zeros();
@@ -311,13 +307,13 @@ fn common_line(sights: &[Sight], ids: &[usize]) -> Option<(Line, [Matrix3<f64>; 
         let by_plane = plane / (across * across);
         // Depth places the line along the ray; along the line itself it says nothing.
         let ray = unit(&reject(&(sight.middle - sight.eye), &sight.along))?;
-        let by_depth = ray * ray.transpose() / (depth * depth * shared);
+        let by_depth = ray * ray.transpose() / (depth * depth);
         position += by_plane + by_depth;
         pull += by_plane * sight.eye.coords + by_depth * sight.middle.coords;
         middle += sight.middle.coords / ids.len() as f64;
         // In the viewing plane, depth alone tells the direction.
         let in_plane = unit(&sight.plane.cross(&sight.along))?;
-        turning += plane / (turn * turn) + in_plane * in_plane.transpose() / (depth_turn * depth_turn * shared);
+        turning += plane / (turn * turn) + in_plane * in_plane.transpose() / (depth_turn * depth_turn);
     }
     let eigen = SymmetricEigen::new(turning);
     let found = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
@@ -592,7 +588,7 @@ mod tests {
     }
 
     #[test]
-    fn depth_errors_of_three_centimetres_leave_a_triangulated_line_within_half_of_what_it_says_of_itself() {
+    fn depth_errors_of_three_centimetres_leave_a_triangulated_line_within_what_it_says_of_itself() {
         let recording = recording();
         let ends = [Point::new(0.1, 0.0, -0.3), Point::new(0.1, 0.02, 0.4)];
         let lifted = lift(&recording, ends, |v| if v % 2 == 0 { 0.02 } else { -0.015 });
@@ -601,10 +597,10 @@ mod tests {
         let track = &tracks[0];
         assert_eq!(track.views.len(), 8);
         for end in &ends {
-            assert!(track.segment.line.distance(end) < 0.5 * track.position_std_m());
+            assert!(track.segment.line.distance(end) < track.position_std_m());
         }
         assert!((track.segment.length() - 0.7).abs() < 0.02);
-        assert!(track.position_std_m() < 0.02);
+        assert!(track.position_std_m() < 0.012);
     }
 
     #[test]
