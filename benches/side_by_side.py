@@ -23,7 +23,8 @@ STAGES = [
     ("view_select_100k", ["peer_views.py", "--frames", "100000"]),
     ("lsd", ["peer_lsd.py"]),
     ("lsd_456", ["peer_lsd.py", "--res", "456x256", "--views", "50"]),
-    ("kalman_rts", ["peer_kalman.py", "--clips", "2000"]),
+    # One of its peers (filterpy) alone takes a quarter of an hour at this size.
+    ("kalman_rts", ["peer_kalman.py"]),
     ("normals_manhattan", ["peer_normals.py", "--res", "456x256", "--views", "50", "--sample", "20000"]),
     ("lines3d_ransac", ["peer_lines3d.py", "--part", "ransac", "--max-tracks", "30"]),
 ]
