@@ -131,6 +131,8 @@ pub enum Role {
     Tray,
     /// Board of the fixed furniture.
     Carcass,
+    /// Walls, worktops and whatever else of the room does not move.
+    Room,
 }
 
 /// One solid box.
@@ -155,10 +157,19 @@ pub struct Joint {
     pub upper: f64,
     /// Largest opening that was observed, rad or m.
     pub observed: f64,
+    /// The opening that a person would expect of such furniture, rad or m; what stands in the way is not counted.
+    #[serde(default)]
+    pub expected: f64,
     /// Viscous damping, N m s/rad or N s/m.
     pub damping: f64,
     /// Dry friction, N m or N.
     pub friction: f64,
+    /// Damping and friction are those that the recorded hand showed (true) or of a table (false).
+    #[serde(default)]
+    pub resistance_seen: bool,
+    /// The part's weight is carried by a spring, as that of an oven's or a dishwasher's door is: gravity does not move it.
+    #[serde(default)]
+    pub balanced: bool,
 }
 
 /// Mass, centre of mass and inertia.
@@ -209,6 +220,9 @@ pub struct Twin {
     pub density_kg_per_m3: f64,
     /// Furniture in the order of the joints.
     pub furniture: Vec<Furniture>,
+    /// What stands around the furniture and does not move; shares no space with any part on its way.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub room: Vec<Solid>,
     /// Joints that could not be built, with the reason.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<LeftOut>,

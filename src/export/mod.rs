@@ -18,6 +18,7 @@ pub(crate) fn color(role: Role) -> [f64; 4] {
         Role::Handle => [0.25, 0.26, 0.28, 1.0],
         Role::Tray => [0.88, 0.86, 0.82, 1.0],
         Role::Carcass => [0.72, 0.73, 0.74, 1.0],
+        Role::Room => [0.62, 0.63, 0.62, 1.0],
     }
 }
 
@@ -28,6 +29,7 @@ pub(crate) fn material(role: Role) -> &'static str {
         Role::Handle => "handle",
         Role::Tray => "tray",
         Role::Carcass => "carcass",
+        Role::Room => "room",
     }
 }
 

@@ -63,7 +63,13 @@ pub fn fit(scene: &Scene, up: &Vector, config: &config::Fitting) -> Twin {
     }
     placed.sort_by_key(|(i, _)| *i);
     let furniture = placed.into_iter().map(|(_, f)| f).collect();
-    Twin { name: scene.recording.clone(), density_kg_per_m3: config.density_kg_per_m3, furniture, left_out }
+    Twin {
+        name: scene.recording.clone(),
+        density_kg_per_m3: config.density_kg_per_m3,
+        furniture,
+        room: Vec::new(),
+        left_out,
+    }
 }
 
 /// Builds a piece that shares no space with what stands already: with a shallower carcass (pieces that meet at a corner),
@@ -318,8 +324,11 @@ fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
                 articulation,
                 upper: upper.clamp(least, std::f64::consts::PI),
                 observed: plan.observed,
+                expected: plan.observed,
                 damping,
                 friction,
+                resistance_seen: false,
+                balanced: false,
             },
             solids,
             handle,

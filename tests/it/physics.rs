@@ -36,6 +36,9 @@ fn door() -> Furniture {
                 observed: 1.2,
                 damping: 0.5,
                 friction: 0.2,
+                expected: 1.9,
+                resistance_seen: false,
+                balanced: false,
             },
             solids: vec![solid("front", Role::Front, leaf)],
             handle: Point::new(0.45, -0.03, 0.4),
@@ -59,7 +62,13 @@ fn hand(joint: &Articulation, range: f64) -> Trajectory {
 }
 
 fn verdict(furniture: Furniture, trajectory: &Trajectory) -> (Verdict, String) {
-    let twin = Twin { name: "t".to_owned(), density_kg_per_m3: 700.0, furniture: vec![furniture], left_out: vec![] };
+    let twin = Twin {
+        name: "t".to_owned(),
+        density_kg_per_m3: 700.0,
+        furniture: vec![furniture],
+        room: vec![],
+        left_out: vec![],
+    };
     let hands = vec![vec![("clip".to_owned(), trajectory)]];
     let validation = validate(&twin, &hands, &Vector::z(), &Config::default().validation).unwrap();
     (validation.joints[0].verdict, validation.joints[0].reason.clone())
