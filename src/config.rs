@@ -226,6 +226,8 @@ block! {
         use_face_normal: bool = true, "-", "ours";
         /// Hinge directions within this angle of an axis of the face are set to it.
         snap_deg: f64 = 12.0, "deg", "ours";
+        /// Fit the hinge and the openings to the depth of the open state.
+        refit: bool = true, "-", "ours";
         /// Merge clips of one joint into one scene-level joint.
         merge_clips: bool = true, "-", "C.2";
         /// Clips whose closed grips are nearer than this can be one joint.
@@ -339,6 +341,7 @@ impl Config {
         config.inference.method = InferenceMethod::Paper;
         config.inference.use_face_normal = false;
         config.inference.merge_clips = false;
+        config.inference.refit = false;
         config
     }
 

@@ -8,7 +8,6 @@ use crate::articulation::{Articulation, JointKind};
 use crate::config;
 use crate::geometry::Face;
 use crate::geometry::moved::Rect;
-use crate::inference::observed_range;
 use crate::math::{Vector, any_orthogonal, reject, unit};
 use crate::pipeline::{Scene, SceneJoint};
 use crate::twin::{Furniture, Joint, LeftOut, OrientedBox, Part, Role, Solid, Twin};
@@ -40,7 +39,7 @@ struct Plan<'a> {
 /// Builds the twin of a scene.
 #[must_use]
 pub fn fit(scene: &Scene, up: &Vector, config: &config::Fitting) -> Twin {
-    let mut plans: Vec<Plan> = scene.joints.iter().map(|j| plan(scene, j, up, config)).collect();
+    let mut plans: Vec<Plan> = scene.joints.iter().map(|j| plan(j, up, config)).collect();
     let mut rects: Vec<(Face, Rect)> = plans.iter().map(|p| (p.face, p.rect)).collect();
     overlap::separate(&mut rects, config);
     for (plan, (_, rect)) in plans.iter_mut().zip(rects) {
@@ -114,7 +113,7 @@ fn shrunk(plan: &Plan, share: f64) -> Rect {
 }
 
 /// Face, rectangle and the joint moved onto them.
-fn plan<'a>(scene: &Scene, joint: &'a SceneJoint, up: &Vector, config: &config::Fitting) -> Plan<'a> {
+fn plan<'a>(joint: &'a SceneJoint, up: &Vector, config: &config::Fitting) -> Plan<'a> {
     let seen_face = joint.face.filter(|f| is_front_of(f, joint, up)).unwrap_or_else(|| assumed_face(joint, up));
     let face = levelled(&seen_face, up);
     let mut articulation = joint.joint;
@@ -132,14 +131,7 @@ fn plan<'a>(scene: &Scene, joint: &'a SceneJoint, up: &Vector, config: &config::
         articulation.origin = face.point(r, u, h);
     }
     let (rect, seen) = rectangle(joint, &articulation, &face);
-    let observed = scene
-        .clips
-        .iter()
-        .filter(|c| joint.clips.contains(&c.clip.clip))
-        .filter_map(|c| c.trajectory.as_ref())
-        .map(|t| observed_range(&articulation, &t.closed_grip(), &t.positions()))
-        .fold(None, |most: Option<f64>, range| Some(most.map_or(range, |m| m.max(range))))
-        .unwrap_or(joint.observed_range);
+    let observed = joint.observed_range;
     Plan { joint, observed, articulation, face, rect, seen }
 }
 
@@ -409,6 +401,7 @@ mod tests {
             face: Some(face),
             part: Some(Rect { bounds: [[-0.5, 0.06], [-0.3, 0.1]] }),
             observed_range: 0.4,
+            moved: vec![],
         }
     }
 

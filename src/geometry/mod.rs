@@ -6,6 +6,7 @@ pub mod detector;
 pub mod face;
 pub mod manhattan;
 pub mod moved;
+pub mod openings;
 pub mod segments;
 pub mod tracks;
 

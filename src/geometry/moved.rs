@@ -50,6 +50,8 @@ pub struct CellVotes {
 #[derive(Debug, Clone, Copy)]
 pub struct View<'a> {
     camera_from_world: Pose,
+    /// Where the camera is, world.
+    pub(super) eye: Point,
     camera: Camera,
     sketch: &'a Sketch,
     /// What the sketch's depth is multiplied by.
@@ -61,7 +63,7 @@ pub struct View<'a> {
 impl View<'_> {
     /// How far behind the world point `p` the seen surface lies (negative: in front of it), and the depth of `p`.
     /// `None` outside the image, under a hand or where there is no depth.
-    fn gap(&self, p: &Point) -> Option<(f64, f64)> {
+    pub(super) fn gap(&self, p: &Point) -> Option<(f64, f64)> {
         let local = self.camera_from_world * p;
         let (u, v) = self.camera.project(&local).filter(|_| local.z > 0.15)?;
         let (x, y) = self.sketch.sample(u, v)?;
@@ -112,8 +114,10 @@ pub fn open_views<'a>(
     open_frames(recording, clip, trajectory)
         .into_iter()
         .filter_map(|(frame, grip)| {
+            let world_from_camera = recording.frames[frame].world_from_camera;
             Some(View {
-                camera_from_world: recording.frames[frame].world_from_camera.inverse(),
+                camera_from_world: world_from_camera.inverse(),
+                eye: Point::from(world_from_camera.translation.vector),
                 camera: recording.camera,
                 sketch: sketches.get(&frame)?,
                 factor: recording.depth_factor(frame),
@@ -187,7 +191,7 @@ fn seen_share(
 }
 
 /// Depth noise that a surface at distance `z` may show: half a voxel and 2 % of the distance (metric depth estimates).
-fn tolerance(z: f64) -> f64 {
+pub(super) fn tolerance(z: f64) -> f64 {
     0.025 + 0.02 * z
 }
 

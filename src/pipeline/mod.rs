@@ -72,6 +72,8 @@ pub struct SceneJoint {
     pub part: Option<Rect>,
     /// Largest opening that was observed, rad or m.
     pub observed_range: f64,
+    /// Opening that each of `clips` went through, rad or m.
+    pub moved: Vec<f64>,
 }
 
 /// The scene.

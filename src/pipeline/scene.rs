@@ -7,9 +7,10 @@ use rayon::prelude::*;
 
 use super::clip::part_shape;
 use super::{ClipResult, SceneJoint};
-use crate::articulation::{Articulation, JointKind};
+use crate::articulation::{Action, Articulation, JointKind};
 use crate::config::Config;
 use crate::geometry::moved::Rect;
+use crate::geometry::openings::{self, OpenState, Opening};
 use crate::geometry::{AxisCandidate, Face, candidates, moved};
 use crate::hands::Trajectory;
 use crate::inference::{self, aggregate};
@@ -182,8 +183,20 @@ fn merge_group(
     }
     let trajectories = || group.iter().filter_map(|&c| clips[c].trajectory.as_ref());
     joint = inference::opening_sense(joint, face.as_ref(), &grip, trajectories());
-    let observed_range =
-        trajectories().map(|t| inference::observed_range(&joint, &t.closed_grip(), &t.positions())).fold(0.0, f64::max);
+    let shown: Vec<(&ClipResult, &Trajectory)> =
+        group.iter().filter_map(|&c| Some((&clips[c], clips[c].trajectory.as_ref()?))).collect();
+    let mut hinge_std_m = None;
+    let mut moved: Vec<f64> =
+        shown.iter().map(|(_, t)| inference::observed_range(&joint, &t.closed_grip(), &t.positions())).collect();
+    if config.inference.refit
+        && let Some((face, rect)) = face.zip(clips[best].part)
+        && let Some(fit) = refitted(recording, sketches, &shown, &joint, &face, &rect, config)
+    {
+        joint = fit.joint;
+        hinge_std_m = (joint.kind == JointKind::Revolute).then_some(fit.position_std_m);
+        moved = fit.ranges;
+    }
+    let observed_range = moved.iter().copied().fold(0.0, f64::max);
     Some(SceneJoint {
         id: String::new(),
         joint,
@@ -198,5 +211,80 @@ fn merge_group(
         face,
         part: clips[best].part,
         observed_range,
+        moved,
     })
+}
+
+/// A joint after its open views were looked at.
+struct Refitted {
+    joint: Articulation,
+    position_std_m: f64,
+    /// Opening that each clip went through, rad or m.
+    ranges: Vec<f64>,
+}
+
+/// The hinge and the openings that the depth of the open states tells. `None` where they were not seen.
+#[allow(clippy::too_many_arguments, reason = "what a group of clips knows")]
+fn refitted(
+    recording: &Recording,
+    sketches: &BTreeMap<usize, Sketch>,
+    shown: &[(&ClipResult, &Trajectory)],
+    joint: &Articulation,
+    face: &Face,
+    rect: &Rect,
+    config: &Config,
+) -> Option<Refitted> {
+    let noise = openings::Noise {
+        hinge_m: config.reasoning.hand_std_m,
+        hand_m: config.reasoning.hand_std_m,
+        board_m: config.fitting.board_m,
+    };
+    let views: Vec<Vec<moved::View>> =
+        shown.iter().map(|(clip, t)| moved::open_views(recording, sketches, &clip.clip, t)).collect();
+    let states: Vec<OpenState> =
+        shown.iter().zip(&views).map(|((_, t), views)| OpenState { grip: t.closed_grip(), views }).collect();
+    let fit = openings::refit(face, rect, joint, &states, &noise)?;
+    let ends: Vec<Opening> = shown
+        .iter()
+        .zip(&states)
+        .zip(&fit.openings)
+        .map(|(((_, t), state), seen)| open_end(&fit.joint, t, state, seen))
+        .collect();
+    let ranges = left_where_found(shown, &ends).into_iter().map(|end| end.max(0.0)).collect();
+    Some(Refitted { joint: fit.joint, position_std_m: fit.position_std_m, ranges })
+}
+
+/// Opening at the open end of a clip: what the views show where the hand was at least four fifths of its way, as much as they
+/// are sure of it.
+fn open_end(joint: &Articulation, trajectory: &Trajectory, state: &OpenState, seen: &[Opening]) -> Opening {
+    let told: Vec<f64> = state.views.iter().map(|v| joint.opening_at(&state.grip, &v.grip)).collect();
+    let end = joint.opening_at(&state.grip, &trajectory.open_grip());
+    let (mut sum, mut total) = (0.0, 0.0);
+    for (opening, told) in seen.iter().zip(&told).filter(|(_, told)| **told > 0.8 * end) {
+        let weight = 1.0 / (opening.std * opening.std);
+        sum += weight * (opening.value - told);
+        total += weight;
+    }
+    // The views share the hand's and the depth's errors: together they are as sure as the surest of them.
+    let std = seen.iter().map(|o| o.std).fold(f64::INFINITY, f64::min);
+    Opening { value: if total > 0.0 { end + sum / total } else { end }, std }
+}
+
+/// A part stays where it was left: the open end of a clip is where the next clip of the part finds it. Both clips' values
+/// become their weighted mean.
+fn left_where_found(shown: &[(&ClipResult, &Trajectory)], ends: &[Opening]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..shown.len()).collect();
+    order.sort_by_key(|&i| (shown[i].0.clip.start_frame, i));
+    let mut out: Vec<f64> = ends.iter().map(|e| e.value).collect();
+    for pair in order.windows(2) {
+        let (a, b) = (pair[0], pair[1]);
+        if shown[a].1.action == Action::Open && shown[b].1.action == Action::Close {
+            let [wa, wb] = [a, b].map(|i| ends[i].std.powi(-2));
+            if (wa + wb).is_finite() && wa + wb > 0.0 {
+                let mean = (wa * ends[a].value + wb * ends[b].value) / (wa + wb);
+                (out[a], out[b]) = (mean, mean);
+            }
+        }
+    }
+    out
 }

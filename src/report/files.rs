@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::articulation::{Articulation, Outcome};
 use crate::evaluation::{Prediction, Predictions};
-use crate::inference::{self, ClipJoint};
+use crate::inference::ClipJoint;
 use crate::math::Point;
 use crate::pipeline::Scene;
 use crate::reasoning::words::Words;
@@ -145,7 +145,7 @@ pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
                 crate::articulation::JointKind::Revolute => phi.line().project(&p),
                 crate::articulation::JointKind::Prismatic => path[0],
             });
-            row.range = Some(inference::observed_range(&phi, &trajectory.closed_grip(), &path));
+            row.range = joint.clips.iter().zip(&joint.moved).find(|(name, _)| **name == c.clip.clip).map(|(_, r)| *r);
             row.part_box = part.map(|p| p.bounds);
             row.confidence = Some(joint.type_probability);
             row.joint = Some(joint.id.clone());
