@@ -195,14 +195,20 @@ pub(super) fn tolerance(z: f64) -> f64 {
     0.025 + 0.02 * z
 }
 
+/// The opening in each view as the hand tells it, rad or m.
+#[must_use]
+pub fn told(joint: &Articulation, grip: &Point, views: &[View]) -> Vec<f64> {
+    views.iter().map(|v| joint.opening_at(grip, &v.grip)).collect()
+}
+
 /// Votes of the closed surface and the open views over the face's visible extent (at most 1.2 m from the grip). With a
-/// `joint`, cells also count as moved where the part is seen in its opened place.
+/// `joint` and its opening in each view, cells also count as moved where the part is seen in its opened place.
 #[must_use]
 pub fn vote(
     face: &Face,
     surface: &[Point],
     open: &[View],
-    joint: Option<(&Articulation, &Point)>,
+    joint: Option<(&Articulation, &[f64])>,
     config: &config::Fitting,
 ) -> CellVotes {
     const REACH_M: f64 = 1.2;
@@ -234,14 +240,16 @@ pub fn vote(
     for i in 0..columns * rows {
         let [right, up] = votes.cell(i % columns, i / columns);
         let here = face.point(right, up, 0.0);
-        for view in open {
+        for (v, view) in open.iter().enumerate() {
             if let Some((gap, z)) = view.gap(&here) {
                 votes.still[i] += u16::from(gap.abs() <= tolerance(z));
                 // Seen through by clearly more than a door's thickness.
                 votes.gone[i] += u16::from(gap > tolerance(z) + 0.04);
             }
-            let Some((joint, grip)) = joint else { continue };
-            let moved = joint.motion(joint.opening_at(grip, &view.grip)) * here;
+            let Some((joint, opening)) = joint.and_then(|(joint, openings)| Some((joint, *openings.get(v)?))) else {
+                continue;
+            };
+            let moved = joint.motion(opening) * here;
             // Only where the part has moved clear of its own noise.
             if let Some((gap, z)) = view.gap(&moved)
                 && (moved - here).norm() > 2.0 * tolerance(z)
@@ -275,7 +283,60 @@ impl CellVotes {
     #[must_use]
     pub fn moving_rect(&self, stops: &[(usize, f64, [f64; 2])]) -> Option<Rect> {
         let seen = self.seen_rect()?;
-        Some(self.grown(seen, stops))
+        Some(self.on_lines(self.grown(seen, stops), stops))
+    }
+
+    /// Moves each side of a rectangle onto the line next to it: fronts end at gaps, which are lines, while cells are coarse and
+    /// their votes blurred by the depth's noise. What lies between side and line must not speak against it.
+    fn on_lines(&self, rect: Rect, stops: &[(usize, f64, [f64; 2])]) -> Rect {
+        /// How far votes put a side from where it is: a standard deviation.
+        const SIDE_STD_M: f64 = 0.03;
+        /// What a line must be worth to be believed.
+        const LEAST: f64 = 0.25;
+        let mut bounds = rect.bounds;
+        for axis in [0, 1] {
+            let across = rect.bounds[1 - axis];
+            let length = across[1] - across[0];
+            for side in [0, 1] {
+                let edge = rect.bounds[axis][side];
+                let worth = |offset: f64, span: [f64; 2]| -> f64 {
+                    let covered = ((span[1].min(across[1]) - span[0].max(across[0])) / length).clamp(0.0, 1.0);
+                    let outward = (offset - edge) * if side == 0 { -1.0 } else { 1.0 };
+                    let [from, to] = if offset < edge { [offset, edge] } else { [edge, offset] };
+                    let against = self.against(axis, [from, to], across, outward > 0.0);
+                    covered * (-0.5 * ((offset - edge) / SIDE_STD_M).powi(2)).exp() * (1.0 - against)
+                };
+                let best = stops
+                    .iter()
+                    .filter(|(a, ..)| *a == axis)
+                    .map(|(_, offset, span)| (worth(*offset, *span), *offset))
+                    .max_by(|a, b| a.0.total_cmp(&b.0));
+                if let Some((worth, offset)) = best
+                    && worth > LEAST
+                {
+                    bounds[axis][side] = offset;
+                }
+            }
+        }
+        // Two sides on one line are no rectangle.
+        if bounds.iter().any(|b| b[1] - b[0] < 0.05) { rect } else { Rect { bounds } }
+    }
+
+    /// Of the cells of a strip that open views saw, the share that was seen to stay (for a strip to be added) or to move (for
+    /// one to be taken away).
+    fn against(&self, axis: usize, strip: [f64; 2], across: [f64; 2], added: bool) -> f64 {
+        let steps = |b: [f64; 2]| ((b[1] - b[0]) / self.cell_m).floor().max(0.0) as usize;
+        let (mut seen, mut against) = (0usize, 0usize);
+        for i in 0..steps(strip) {
+            for k in 0..steps(across) {
+                let (x, y) = (strip[0] + (i as f64 + 0.5) * self.cell_m, across[0] + (k as f64 + 0.5) * self.cell_m);
+                let Some(cell) = (if axis == 0 { self.index(x, y) } else { self.index(y, x) }) else { continue };
+                let (still, gone) = (self.still[cell], self.gone[cell]);
+                seen += usize::from(still != gone);
+                against += usize::from(if added { still > gone } else { gone > still });
+            }
+        }
+        against as f64 / seen.max(1) as f64
     }
 
     /// Extends a rectangle side by side over cells that no open view saw.

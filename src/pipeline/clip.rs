@@ -188,7 +188,7 @@ pub(super) fn infer(
     };
     // With the joint known, the part is also seen where the joint puts it: the rectangle again, from all evidence.
     if let (Some(face), Outcome::Found(joint)) = (&result.face, &result.joint) {
-        let votes = moved::vote(face, &surface, &open, Some((&joint.joint, &region.grip)), &config.fitting);
+        let votes = moved::vote(face, &surface, &open, Some((&joint.joint, &moved::told(&joint.joint, &region.grip, &open))), &config.fitting);
         result.part = votes.moving_rect(&stops).or(result.part);
     }
     result.answer = Some(answer);
@@ -202,7 +202,7 @@ fn upward(recording: &Recording, room: Option<&ManhattanFrame>) -> crate::math::
 }
 
 /// Points of the touched furniture: of the local frames, and of the global views where masks tell what belongs to it.
-fn surface(
+pub(super) fn surface(
     recording: &Recording,
     region: &Region,
     views: &[usize],
@@ -218,7 +218,7 @@ fn surface(
 }
 
 /// Lines on a face that run along one of its axes, as [`moved::CellVotes::moving_rect`] takes them.
-fn edges_on(face: &Face, lines: &[LineTrack]) -> Vec<(usize, f64, [f64; 2])> {
+pub(super) fn edges_on(face: &Face, lines: &[LineTrack]) -> Vec<(usize, f64, [f64; 2])> {
     lines
         .iter()
         .filter_map(|line| {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::clip::part_shape;
+use super::clip::{self, part_shape};
 use super::{ClipResult, SceneJoint};
 use crate::articulation::{Action, Articulation, JointKind};
 use crate::config::Config;
@@ -186,6 +186,7 @@ fn merge_group(
     let shown: Vec<(&ClipResult, &Trajectory)> =
         group.iter().filter_map(|&c| Some((&clips[c], clips[c].trajectory.as_ref()?))).collect();
     let mut hinge_std_m = None;
+    let mut part = clips[best].part;
     let mut moved: Vec<f64> =
         shown.iter().map(|(_, t)| inference::observed_range(&joint, &t.closed_grip(), &t.positions())).collect();
     if config.inference.refit
@@ -195,6 +196,14 @@ fn merge_group(
         joint = fit.joint;
         hinge_std_m = (joint.kind == JointKind::Revolute).then_some(fit.position_std_m);
         moved = fit.ranges;
+        // With the openings known better the part's outline is, too.
+        if let Some(region) = &clips[best].region {
+            let reach = config.localization.reach_m;
+            let surface = clip::surface(recording, region, &clips[best].views, sketches, reach);
+            let stops = clip::edges_on(&face, &clips[best].lines);
+            let votes = moved::vote(&face, &surface, &fit.views, Some((&joint, &fit.openings)), &config.fitting);
+            part = votes.moving_rect(&stops).or(part);
+        }
     }
     let observed_range = moved.iter().copied().fold(0.0, f64::max);
     Some(SceneJoint {
@@ -209,15 +218,18 @@ fn merge_group(
         type_probability,
         grip,
         face,
-        part: clips[best].part,
+        part,
         observed_range,
         moved,
     })
 }
 
 /// A joint after its open views were looked at.
-struct Refitted {
+struct Refitted<'a> {
     joint: Articulation,
+    /// All clips' views of the open state, and the opening in each.
+    views: Vec<moved::View<'a>>,
+    openings: Vec<f64>,
     position_std_m: f64,
     /// Opening that each clip went through, rad or m.
     ranges: Vec<f64>,
@@ -225,15 +237,15 @@ struct Refitted {
 
 /// The hinge and the openings that the depth of the open states tells. `None` where they were not seen.
 #[allow(clippy::too_many_arguments, reason = "what a group of clips knows")]
-fn refitted(
+fn refitted<'a>(
     recording: &Recording,
-    sketches: &BTreeMap<usize, Sketch>,
+    sketches: &'a BTreeMap<usize, Sketch>,
     shown: &[(&ClipResult, &Trajectory)],
     joint: &Articulation,
     face: &Face,
     rect: &Rect,
     config: &Config,
-) -> Option<Refitted> {
+) -> Option<Refitted<'a>> {
     let noise = openings::Noise {
         hinge_m: config.reasoning.hand_std_m,
         hand_m: config.reasoning.hand_std_m,
@@ -251,13 +263,15 @@ fn refitted(
         .map(|(((_, t), state), seen)| open_end(&fit.joint, t, state, seen))
         .collect();
     let ranges = left_where_found(shown, &ends).into_iter().map(|end| end.max(0.0)).collect();
-    Some(Refitted { joint: fit.joint, position_std_m: fit.position_std_m, ranges })
+    let openings = fit.openings.iter().flatten().map(|o| o.value).collect();
+    let views = views.into_iter().flatten().collect();
+    Some(Refitted { joint: fit.joint, views, openings, position_std_m: fit.position_std_m, ranges })
 }
 
 /// Opening at the open end of a clip: what the views show where the hand was at least four fifths of its way, as much as they
 /// are sure of it.
 fn open_end(joint: &Articulation, trajectory: &Trajectory, state: &OpenState, seen: &[Opening]) -> Opening {
-    let told: Vec<f64> = state.views.iter().map(|v| joint.opening_at(&state.grip, &v.grip)).collect();
+    let told = moved::told(joint, &state.grip, state.views);
     let end = joint.opening_at(&state.grip, &trajectory.open_grip());
     let (mut sum, mut total) = (0.0, 0.0);
     for (opening, told) in seen.iter().zip(&told).filter(|(_, told)| **told > 0.8 * end) {
