@@ -12,7 +12,7 @@ use super::Face;
 use crate::articulation::{Action, Articulation, JointKind};
 use crate::config;
 use crate::hands::Trajectory;
-use crate::math::{Point, Pose};
+use crate::math::{Point, Pose, Vector};
 use crate::recording::sketch::Sketch;
 use crate::recording::{Camera, Clip, Recording};
 
@@ -60,7 +60,15 @@ pub struct View<'a> {
     pub grip: Point,
 }
 
+/// A leaf seen at less than this slant (cosine) shows its edge.
+const GRAZING: f64 = 0.2;
+
 impl View<'_> {
+    /// Whether a surface at `p` with this normal is seen edge-on: a small error of its place is a large one of its depth.
+    fn grazes(&self, p: &Point, normal: &Vector) -> bool {
+        crate::math::unit(&(p - self.eye)).is_none_or(|ray| normal.dot(&ray).abs() < GRAZING)
+    }
+
     /// How far behind the world point `p` the seen surface lies (negative: in front of it), and the depth of `p`.
     /// `None` outside the image, under a hand or where there is no depth.
     pub(super) fn gap(&self, p: &Point) -> Option<(f64, f64)> {
@@ -249,7 +257,11 @@ pub fn vote(
             let Some((joint, opening)) = joint.and_then(|(joint, openings)| Some((joint, *openings.get(v)?))) else {
                 continue;
             };
-            let moved = joint.motion(opening) * here;
+            let motion = joint.motion(opening);
+            let moved = motion * here;
+            if view.grazes(&moved, &(motion.rotation * face.normal)) {
+                continue;
+            }
             // Only where the part has moved clear of its own noise.
             if let Some((gap, z)) = view.gap(&moved)
                 && (moved - here).norm() > 2.0 * tolerance(z)

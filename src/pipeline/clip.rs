@@ -188,7 +188,13 @@ pub(super) fn infer(
     };
     // With the joint known, the part is also seen where the joint puts it: the rectangle again, from all evidence.
     if let (Some(face), Outcome::Found(joint)) = (&result.face, &result.joint) {
-        let votes = moved::vote(face, &surface, &open, Some((&joint.joint, &moved::told(&joint.joint, &region.grip, &open))), &config.fitting);
+        let votes = moved::vote(
+            face,
+            &surface,
+            &open,
+            Some((&joint.joint, &moved::told(&joint.joint, &region.grip, &open))),
+            &config.fitting,
+        );
         result.part = votes.moving_rect(&stops).or(result.part);
     }
     result.answer = Some(answer);
