@@ -311,15 +311,22 @@ pub struct Config {
 impl Config {
     /// Reads a TOML file; keys that are absent keep their defaults, unknown keys and impossible values are errors.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+        Self::parse(&std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?, path)
+    }
+
+    /// The same from the text of a file; `path` is named in errors.
+    ///
+    /// # Errors
+    /// Unknown keys and impossible values.
+    pub fn parse(text: &str, path: &Path) -> Result<Self> {
         let wrong = |e: toml::de::Error| Error::Config(format!("{}: {}", path.display(), e.to_string().trim_end()));
         // The file's own words first, so that a slip is told with its line; then its values over those of its method.
-        let config: Self = toml::from_str(&text).map_err(wrong)?;
+        let config: Self = toml::from_str(text).map_err(wrong)?;
         let config = match config.method {
             Method::Ours => config,
             Method::Paper => {
                 let mut values = toml::Table::try_from(Self::paper()).map_err(|e| Error::Config(e.to_string()))?;
-                overlay(&mut values, toml::from_str(&text).map_err(wrong)?);
+                overlay(&mut values, toml::from_str(text).map_err(wrong)?);
                 toml::Value::Table(values).try_into().map_err(wrong)?
             }
         };

@@ -1,58 +1,118 @@
 //! `paws evaluate`.
 
-use std::path::PathBuf;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use clap::Args;
+use serde::Serialize;
 
 use super::output::write_file;
-use super::{Answer, print};
-use crate::evaluation::summary::Shares;
-use crate::evaluation::{Predictions, Report, Truth, evaluate};
+use super::{Answer, print, shown};
+use crate::evaluation::{Paired, Predictions, Report, Truth, compare, evaluate};
 use crate::json;
-use crate::report::table::aligned;
-use crate::report::words;
+use crate::report::accuracy;
 
 #[derive(Debug, Args)]
 pub struct EvaluateArgs {
-    /// predictions.json, or a folder that `paws twin` wrote
-    predictions: PathBuf,
+    /// predictions.json, or a folder that `paws twin` wrote; then the recordings with a ground_truth.json, or such files.
+    /// With --truth all of them are predictions, taken together
+    #[arg(required = true, value_name = "PREDICTIONS RECORDING")]
+    inputs: Vec<PathBuf>,
     /// Recordings with a ground_truth.json, or such files
-    #[arg(required = true)]
+    #[arg(long, value_name = "RECORDING", num_args = 1..)]
     truth: Vec<PathBuf>,
     /// One line a clip as well
     #[arg(long)]
     clips: bool,
+    /// All the rest: what became of the clips, other denominators, groups, errors, calibration
+    #[arg(long)]
+    details: bool,
+    /// Other predictions for the same clips: the difference, with its interval
+    #[arg(long, value_name = "PREDICTIONS")]
+    against: Option<PathBuf>,
     /// Write the whole report as JSON to this file
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Write one row a clip with every measure and every rule's verdict as CSV to this file
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+}
+
+/// The JSON report.
+#[derive(Serialize)]
+struct File<'a> {
+    #[serde(flatten)]
+    report: &'a Report,
+    /// The difference to other predictions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    against: Option<Vec<Paired>>,
 }
 
 pub fn run(args: &EvaluateArgs) -> anyhow::Result<Answer> {
-    let file =
-        if args.predictions.is_dir() { args.predictions.join("predictions.json") } else { args.predictions.clone() };
-    let predictions = Predictions::read(&file)?;
-    let truths: Vec<Truth> = args.truth.iter().map(|p| Truth::read(p)).collect::<Result<_, _>>()?;
-    let mut names: Vec<&str> = truths.iter().map(|t| t.recording.as_str()).collect();
-    names.sort_unstable();
-    names.dedup();
-    if names.len() != truths.len() {
-        bail!("two of the truths are of recordings with one name; rename a folder");
-    }
-    check_units(&predictions, &truths, &file)?;
-    let report = evaluate(&predictions, &truths);
+    let (files, recordings) = match (args.truth.as_slice(), args.inputs.as_slice()) {
+        ([], [_]) => bail!("no truth: name recordings with a ground_truth.json after the predictions"),
+        ([], [file, recordings @ ..]) => (std::slice::from_ref(file), recordings),
+        (recordings, files) => (files, recordings),
+    };
+    let truths = truths(recordings)?;
+    let report = evaluate(&predictions(files, &truths)?, &truths);
+    let against = match &args.against {
+        None => None,
+        Some(file) => {
+            let other = evaluate(&predictions(std::slice::from_ref(file), &truths)?, &truths);
+            Some(compare(&report, &other).ok_or_else(|| anyhow::anyhow!("no clip of the truth moves a joint"))?)
+        }
+    };
     if args.clips {
-        print(&per_clip(&report))?;
+        print(&accuracy::per_clip(&report))?;
     }
-    print(&text(&report))?;
+    print(&accuracy::headline(&report))?;
+    if args.details {
+        print(&accuracy::details(&report))?;
+    }
+    if let Some((file, rows)) = args.against.as_ref().zip(against.as_ref()) {
+        print(&format!("\nminus {}, on the same clips\n{}", shown(file), accuracy::paired(rows)))?;
+    }
+    if let Some(path) = &args.csv {
+        write_file(path, accuracy::csv(&report))?;
+    }
     if let Some(path) = &args.json {
-        write_file(path, json::text(&report)?)?;
+        write_file(path, json::text(&File { report: &report, against })?)?;
     }
     Ok(Answer::Yes)
 }
 
+/// The truths of recordings, each of another name.
+pub fn truths(recordings: &[PathBuf]) -> anyhow::Result<Vec<Truth>> {
+    let truths: Vec<Truth> = recordings.iter().map(|p| Truth::read(p)).collect::<Result<_, _>>()?;
+    let names: BTreeSet<&str> = truths.iter().map(|t| t.recording.as_str()).collect();
+    if names.len() != truths.len() {
+        bail!("two of the truths are of recordings with one name; rename a folder");
+    }
+    Ok(truths)
+}
+
+/// Predictions of several files together; a clip may have a row in one of them only.
+fn predictions(files: &[PathBuf], truths: &[Truth]) -> anyhow::Result<Predictions> {
+    let mut all = Predictions::default();
+    let mut seen = BTreeSet::new();
+    for path in files {
+        let file = if path.is_dir() { path.join("predictions.json") } else { path.clone() };
+        let read = Predictions::read(&file)?;
+        check_units(&read, truths, &file)?;
+        for row in read.predictions {
+            if !seen.insert((row.recording.clone(), row.clip.clone())) {
+                bail!("{}: {}/{} is in an earlier file already", file.display(), row.recording, row.clip);
+            }
+            all.predictions.push(row);
+        }
+    }
+    Ok(all)
+}
+
 /// A prediction a hundred metres from its truth is in another unit or another world frame, not merely wrong.
-fn check_units(predictions: &Predictions, truths: &[Truth], file: &std::path::Path) -> anyhow::Result<()> {
+fn check_units(predictions: &Predictions, truths: &[Truth], file: &Path) -> anyhow::Result<()> {
     for truth in truths {
         let distances: Vec<f64> = predictions
             .predictions
@@ -70,68 +130,4 @@ fn check_units(predictions: &Predictions, truths: &[Truth], file: &std::path::Pa
         }
     }
     Ok(())
-}
-
-fn text(report: &Report) -> String {
-    let mut text = format!(
-        "clips that move a joint: {}   answered (Match): {} = {:.3} micro, {:.3} macro\n\
-         clips that move none: {}   answered all the same (false positives): {}\n\n",
-        report.clips,
-        report.answered,
-        report.match_share,
-        report.match_macro,
-        report.distractors,
-        report.false_positives
-    );
-    let header = ["rule", "of", "average", "M", "MA", "MAO"];
-    let mut rows = vec![header.map(str::to_owned).to_vec()];
-    let mut row = |rule: &str, of: &str, average: &str, s: Option<Shares>| {
-        let cell = |f: fn(&Shares) -> f64| s.as_ref().map_or("-".to_owned(), |s| format!("{:.3}", f(s)));
-        rows.push(vec![
-            rule.to_owned(),
-            of.to_owned(),
-            average.to_owned(),
-            cell(|s| s.m),
-            cell(|s| s.ma),
-            cell(|s| s.mao),
-        ]);
-    };
-    for r in &report.rules {
-        let name = r.rule.name();
-        row(name, "all clips", "micro", Some(r.micro));
-        row(name, "all clips", "macro", Some(r.macro_));
-        row(name, "answered", "micro", r.micro_conditional);
-        row(name, "answered", "macro", r.macro_conditional);
-    }
-    text += &aligned(&rows);
-    if !report.unknown.is_empty() {
-        text += &format!("\npredictions that no truth knows: {}\n", report.unknown.join(", "));
-    }
-    text
-}
-
-fn per_clip(report: &Report) -> String {
-    let header =
-        ["recording", "clip", "joint", "type", "axis", "point to point", "hinge off by", "range off by", "box IoU"];
-    let mut rows = vec![header.map(str::to_owned).to_vec()];
-    for c in &report.per_clip {
-        let mut row = vec![c.recording.clone(), c.clip.clone(), c.joint.clone()];
-        match &c.measured {
-            None => row.push(format!("no answer: {}", c.reason.as_deref().unwrap_or("not in the predictions"))),
-            Some(m) => {
-                let inward = if m.signed_axis_rad > std::f64::consts::FRAC_PI_2 { ", inward" } else { "" };
-                let metres = |d: Option<f64>| d.map_or("-".to_owned(), words::centimetres);
-                row.extend([
-                    if m.type_right { "right" } else { "wrong" }.to_owned(),
-                    format!("{:.1}°{inward}", m.axis_rad.to_degrees()),
-                    metres(m.point_to_point_m),
-                    metres(m.truth_to_line_m),
-                    m.range_error.map_or("-".to_owned(), |r| words::amount(m.kind, r)),
-                    m.box_iou.map_or("-".to_owned(), |v| format!("{v:.2}")),
-                ]);
-            }
-        }
-        rows.push(row);
-    }
-    format!("{}\n", aligned(&rows))
 }

@@ -14,6 +14,7 @@ use crate::config::Config;
 use crate::evaluation::Predictions;
 use crate::inference::bare;
 use crate::json;
+use crate::pipeline::Scene;
 use crate::recording::{Recording, trajectory};
 use crate::report::table::aligned;
 use crate::report::{files, words};
@@ -62,11 +63,8 @@ fn recordings(
     }
     let mut total: Option<Usage> = None;
     for recording in &opened {
-        let steps = Steps::new();
-        let model::Inferred { scene, usage, .. } = model::infer(recording, config, asked, &steps, false)?;
+        let Predicted { scene, predictions, usage } = predict(recording, config, asked)?;
         total = model::added(total, usage);
-        let twin = crate::fitting::fit(&scene, &recording.up(), &config.fitting);
-        steps.finish();
         for c in &scene.clips {
             let joint = scene.joints.iter().find(|j| j.clips.contains(&c.clip.clip));
             rows.push(vec![
@@ -77,7 +75,7 @@ fn recordings(
                 words::clip_reason(c),
             ]);
         }
-        all.predictions.extend(files::predictions(&scene, &twin).predictions);
+        all.predictions.extend(predictions.predictions);
     }
     print(&aligned(&rows))?;
     if let Some(out) = out {
@@ -89,6 +87,26 @@ fn recordings(
     }
     let found = all.predictions.iter().any(|p| p.kind.is_some());
     Ok(if found { Answer::Yes } else { Answer::No })
+}
+
+/// What is predicted for a recording.
+pub struct Predicted {
+    /// The scene.
+    pub scene: Scene,
+    /// One row a clip.
+    pub predictions: Predictions,
+    /// What a model was asked so far, where one is.
+    pub usage: Option<Usage>,
+}
+
+/// Inference and fit of one recording under one configuration.
+pub fn predict(recording: &Recording, config: &Config, asked: Option<&Asked>) -> anyhow::Result<Predicted> {
+    let steps = Steps::new();
+    let model::Inferred { scene, usage, .. } = model::infer(recording, config, asked, &steps, false)?;
+    let twin = crate::fitting::fit(&scene, &recording.up(), &config.fitting);
+    steps.finish();
+    let predictions = files::predictions(&scene, &twin);
+    Ok(Predicted { scene, predictions, usage })
 }
 
 fn bare_trajectories(paths: &[&PathBuf], config: &Config, out: Option<&Path>) -> anyhow::Result<Answer> {

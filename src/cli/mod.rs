@@ -2,6 +2,7 @@
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command prints; the library does not")]
 
+mod ablate;
 mod config;
 mod demo;
 mod evaluate;
@@ -59,6 +60,8 @@ enum Command {
     Validate(validate::ValidateArgs),
     /// Compare predictions with the truth
     Evaluate(evaluate::EvaluateArgs),
+    /// Compare configurations on recordings with a truth
+    Ablate(ablate::AblateArgs),
     /// Measure the steps before the joint inference on recordings with a truth
     Measure(measure::MeasureArgs),
     /// Write a recording of a synthetic kitchen with a known answer
@@ -96,6 +99,7 @@ pub fn run() -> ExitCode {
         Command::Export(args) => export::run(&args),
         Command::Validate(args) => validate::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
+        Command::Ablate(args) => ablate::run(&args),
         Command::Measure(args) => measure::run(&args),
         Command::Synth(args) => synth::run(&args),
         Command::Config(args) => config::run(&args),

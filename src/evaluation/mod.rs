@@ -1,10 +1,16 @@
 //! Predictions against truth under named rules, because "MAO" alone is not one number.
 
+pub mod bootstrap;
+pub mod calibration;
+pub mod deviations;
+pub mod failures;
+pub mod paired;
 pub mod rules;
 pub mod stages;
 pub mod summary;
 pub mod truth;
 
-pub use rules::{Measured, Rule};
+pub use paired::{Paired, compare};
+pub use rules::{ErrorRule, Measured, Rule};
 pub use summary::{Report, evaluate};
-pub use truth::{Prediction, Predictions, Truth};
+pub use truth::{Prediction, Predictions, Stage, Truth};

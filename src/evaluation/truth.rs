@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::articulation::JointKind;
+use crate::articulation::{Action, JointKind};
 use crate::error::{Error, Result};
 use crate::json;
 use crate::math::{Point, Vector, unit};
@@ -18,8 +18,20 @@ pub struct Predictions {
     pub predictions: Vec<Prediction>,
 }
 
+/// The step after which a clip had no answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Stage {
+    /// No hand, or too little of it.
+    Hands,
+    /// The hand is known, the furniture is not.
+    Localization,
+    /// The furniture is known; no joint explains the hand.
+    Inference,
+}
+
 /// The prediction for one clip.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Prediction {
     /// Name of the recording.
     pub recording: String,
@@ -46,12 +58,18 @@ pub struct Prediction {
     /// Probability that the answer's type is right.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub confidence: Option<f64>,
+    /// Probability that type, axis and origin are right.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint_confidence: Option<f64>,
     /// Which joint of the scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint: Option<String>,
     /// Why there is no answer.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
+    /// Where the answer was lost, if there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stage: Option<Stage>,
 }
 
 impl Predictions {
@@ -69,6 +87,11 @@ impl Predictions {
                 if !orthonormal || !b.half.iter().all(|h| h.is_finite() && *h > 0.0) {
                     let message = "part_box: half sizes must be positive, the columns of R orthonormal";
                     return Err(Error::format(path, place, message));
+                }
+            }
+            for (name, value) in [("confidence", p.confidence), ("joint_confidence", p.joint_confidence)] {
+                if value.is_some_and(|v| !(0.0..=1.0).contains(&v)) {
+                    return Err(Error::format(path, place, format!("{name} must be a probability, from 0 to 1")));
                 }
             }
             if p.kind.is_none() {
@@ -91,8 +114,44 @@ impl Predictions {
 pub struct Truth {
     /// Name of the recording.
     pub recording: String,
+    /// How noisy the recording is, as its maker calls it; else the word for it in the recording's name.
+    pub tier: Option<String>,
     /// Every narrated clip; `None` where it moves no joint.
     pub clips: BTreeMap<String, Option<TrueClip>>,
+}
+
+/// How a hinge lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Orientation {
+    /// Within 37 degrees of up.
+    Upright,
+    /// Within 12 degrees of level.
+    Level,
+    /// Between the two.
+    Other,
+}
+
+impl Orientation {
+    /// Of a unit axis; `up` is unit.
+    #[must_use]
+    pub fn of(axis: &Vector, up: &Vector) -> Self {
+        match axis.dot(up).abs() {
+            along if along > 0.8 => Self::Upright,
+            along if along < 0.2 => Self::Level,
+            _ => Self::Other,
+        }
+    }
+
+    /// The word for people.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Upright => "upright",
+            Self::Level => "level",
+            Self::Other => "other",
+        }
+    }
 }
 
 /// What a clip really shows.
@@ -112,10 +171,27 @@ pub struct TrueClip {
     pub moved: f64,
     /// Box of the moving part, closed.
     pub part_box: OrientedBox,
+    /// Box of the furniture without its moving parts.
+    pub base_box: Option<OrientedBox>,
+    /// The handle when closed.
+    pub handle: Option<Point>,
+    /// What people call the furniture.
+    pub noun: Option<String>,
+    /// Opening or closing.
+    pub action: Option<Action>,
+    /// How a hinge lies; `None` for slides.
+    pub orientation: Option<Orientation>,
 }
+
+/// Words for how noisy a recording is that are looked for in its name.
+const TIERS: [&str; 9] = ["clean", "realistic", "hard", "t0", "t1", "t2", "t3", "hd", "short"];
 
 #[derive(Deserialize)]
 struct TruthFile {
+    #[serde(default)]
+    tier: Option<String>,
+    #[serde(default)]
+    up: Option<Vector>,
     joints: Vec<TrueJoint>,
     clips: Vec<TruthClip>,
 }
@@ -129,12 +205,20 @@ struct TrueJoint {
     origin: Point,
     origin_handle: Point,
     part_box: OrientedBox,
+    #[serde(default)]
+    base_box: Option<OrientedBox>,
+    #[serde(default)]
+    handle_closed: Option<Point>,
+    #[serde(default)]
+    noun: Option<String>,
 }
 
 #[derive(Deserialize)]
 struct TruthClip {
     clip: String,
     joint: String,
+    #[serde(default)]
+    action: Option<Action>,
     x: Vec<f64>,
 }
 
@@ -158,6 +242,8 @@ impl Truth {
             .ok()
             .and_then(|d| d.file_name().map(|n| n.to_string_lossy().into_owned()))
             .ok_or_else(|| Error::format(&file, "folder", "has no name"))?;
+        let up = truth.up.and_then(|up| unit(&up)).unwrap_or_else(Vector::z);
+        let tier = truth.tier.or_else(|| tier_in(&recording));
         let mut clips: BTreeMap<String, Option<TrueClip>> = names.clips.into_iter().map(|c| (c.clip, None)).collect();
         for clip in truth.clips {
             let place = format!("clip {}", clip.clip);
@@ -176,9 +262,45 @@ impl Truth {
                 origin_handle: joint.origin_handle,
                 moved: if high >= low { high - low } else { 0.0 },
                 part_box: joint.part_box,
+                base_box: joint.base_box,
+                handle: joint.handle_closed,
+                noun: joint.noun.clone(),
+                action: clip.action,
+                orientation: (joint.kind == JointKind::Revolute).then(|| Orientation::of(&axis, &up)),
             };
             clips.insert(clip.clip, Some(entry));
         }
-        Ok(Self { recording, clips })
+        Ok(Self { recording, tier, clips })
+    }
+}
+
+/// The word for how noisy a recording is in its name.
+fn tier_in(recording: &str) -> Option<String> {
+    let name = recording.to_lowercase();
+    let mut words = name.split(|c: char| !c.is_ascii_alphanumeric());
+    words.find(|w| TIERS.contains(w)).map(str::to_owned)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tier_is_a_word_of_the_name_not_a_part_of_one() {
+        assert_eq!(tier_in("apartment_Hard").as_deref(), Some("hard"));
+        assert_eq!(tier_in("T2-0013").as_deref(), Some("t2"));
+        assert_eq!(tier_in("hardware_store"), None);
+    }
+
+    #[test]
+    fn confidences_are_probabilities() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("p.json");
+        let row = r#"{"predictions": [{"recording": "r", "clip": "c", "type": null, "joint_confidence": 1.2}]}"#;
+        std::fs::write(&path, row).unwrap();
+        let error = Predictions::read(&path).unwrap_err().to_string();
+        assert!(error.contains("r/c") && error.contains("joint_confidence"), "{error}");
+        std::fs::write(&path, row.replace("\"joint_confidence\": 1.2", "\"stage\": \"localization\"")).unwrap();
+        assert_eq!(Predictions::read(&path).unwrap().predictions[0].stage, Some(Stage::Localization));
     }
 }

@@ -128,8 +128,10 @@ pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
                 range: None,
                 part_box: None,
                 confidence: None,
+                joint_confidence: None,
                 joint: None,
                 reason: c.joint.reason().map(str::to_owned),
+                stage: None,
             };
             let joint = scene.joints.iter().find(|j| j.clips.contains(&c.clip.clip));
             let part = joint.and_then(|j| twin.furniture.iter().map(|f| &f.part).find(|p| p.id == j.id));

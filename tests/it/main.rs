@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "a test that fails should say so at once")]
 
+mod accuracy;
 mod bad_input;
 mod bare_trajectories;
 mod common;
