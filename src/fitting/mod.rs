@@ -96,7 +96,7 @@ fn hands<'a>(scene: &'a Scene, joint: &SceneJoint) -> Vec<&'a Trajectory> {
         .filter(|t| !t.samples.is_empty())
         .collect();
     let start = |t: &Trajectory| t.samples.first().map_or(f64::NEG_INFINITY, |s| s.time_secs);
-    hands.sort_by(|a, b| start(a).total_cmp(&start(b)));
+    hands.sort_by(|&a, &b| start(a).total_cmp(&start(b)));
     hands
 }
 
