@@ -134,10 +134,8 @@ fn folded(mut bins: Vec<Bin>, views: impl Fn(u32, u32) -> u32) -> Vec<Bin> {
             Some(last) if last.index == bin.index => {
                 last.views = views(last.views, bin.views);
                 last.count += bin.count;
-                for k in 0..3 {
-                    last.sum[k] += bin.sum[k];
-                    last.squares[k] += bin.squares[k];
-                }
+                last.sum.iter_mut().zip(bin.sum).for_each(|(sum, more)| *sum += more);
+                last.squares.iter_mut().zip(bin.squares).for_each(|(sum, more)| *sum += more);
             }
             _ => out.push(bin),
         }
