@@ -258,6 +258,16 @@ block! {
         slide_damping: f64 = 5.0, "N s/m", "ours";
         /// Dry friction of slides.
         slide_friction: f64 = 2.0, "N", "ours";
+        /// Build the rest of the room (walls, floor, worktops, furniture that nobody opened) as boxes that do not move.
+        room: bool = true, "-", "ours";
+        /// Edge of the cells in which the room is gathered.
+        room_voxel_m: f64 = 0.05, "m", "ours";
+        /// A cell of the room has been seen in at least this many views.
+        room_min_views: usize = 3, "views", "ours";
+        /// The room is built as far as this from the furniture that opens.
+        room_reach_m: f64 = 6.0, "m", "ours";
+        /// Boxes of the room at the most, beside floor and walls; the largest stay.
+        room_boxes: usize = 300, "boxes", "ours";
     }
 }
 
@@ -435,13 +445,14 @@ fn sensible(row: &Row) -> [f64; 2] {
         ("fitting.clearance_m" | "fitting.board_m", _) => [1e-4, 0.1],
         ("fitting.cell_m" | "localization.voxel_m", _) => [2e-3, 1.0],
         ("fitting.carcass_depth_m", _) => [0.15, 5.0],
+        ("fitting.room_voxel_m", _) => [0.02, 1.0],
         ("validation.step_secs", _) => [1e-4, 0.02],
         (_, "share") => [1e-9, 1.0 - 1e-9],
         (_, "m") => [1e-4, 100.0],
         (_, "s") => [1e-3, 100.0],
         (_, "deg") => [1e-2, 180.0],
         ("reasoning.vlm_lines_per_view", _) => [1.0, 9.0],
-        (_, "px" | "frames" | "views" | "samples" | "lines") => [1.0, 1e4],
+        (_, "px" | "frames" | "views" | "samples" | "lines" | "boxes") => [1.0, 1e4],
         (_, "tokens") => [1.0, 1e5],
         ("geometry.normals_per_frame", _) => [100.0, 1e6],
         (_, "-") => [1e-3, 1e4],

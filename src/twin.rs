@@ -153,7 +153,8 @@ pub struct Solid {
 pub struct Joint {
     /// Type, axis (positive opens) and origin: on a hinge the point nearest to the part's middle.
     pub articulation: Articulation,
-    /// Upper limit, rad or m; the lower one is 0 = closed.
+    /// Upper limit, rad or m; the lower one is 0 = closed. As far as is expected while nothing is in the way; below what was
+    /// observed where seen or surer furniture is.
     pub upper: f64,
     /// Largest opening that was observed, rad or m.
     pub observed: f64,

@@ -1,6 +1,10 @@
-//! From joints to boxes: the moving part around what was seen to move, its handle, the furniture behind it (ours).
+//! From joints to boxes: the moving part around what was seen to move, its handle, the furniture behind it, how far it opens
+//! and what it resists with, and the room around it (ours).
 
+mod limits;
 pub mod overlap;
+mod resistance;
+mod room;
 
 use nalgebra::Matrix3;
 
@@ -8,6 +12,7 @@ use crate::articulation::{Articulation, JointKind};
 use crate::config;
 use crate::geometry::Face;
 use crate::geometry::moved::Rect;
+use crate::hands::Trajectory;
 use crate::math::{Vector, any_orthogonal, reject, unit};
 use crate::pipeline::{Scene, SceneJoint};
 use crate::twin::{Furniture, Joint, LeftOut, OrientedBox, Part, Role, Solid, Twin};
@@ -34,6 +39,8 @@ struct Plan<'a> {
     face: Face,
     rect: Rect,
     seen: bool,
+    /// Against gravity, unit.
+    up: Vector,
 }
 
 /// Builds the twin of a scene.
@@ -60,15 +67,51 @@ pub fn fit(scene: &Scene, up: &Vector, config: &config::Fitting) -> Twin {
             }),
         }
     }
-    placed.sort_by_key(|(i, _)| *i);
-    let furniture = placed.into_iter().map(|(_, f)| f).collect();
-    Twin {
-        name: scene.recording.clone(),
-        density_kg_per_m3: config.density_kg_per_m3,
-        furniture,
-        room: Vec::new(),
-        left_out,
+    let mut ranked: Vec<(usize, usize, Furniture)> =
+        placed.into_iter().enumerate().map(|(rank, (i, f))| (i, rank, f)).collect();
+    ranked.sort_by_key(|(i, ..)| *i);
+    let ranks: Vec<usize> = ranked.iter().map(|(_, rank, _)| *rank).collect();
+    let joints: Vec<&SceneJoint> = ranked.iter().map(|(i, ..)| plans[*i].joint).collect();
+    let mut furniture: Vec<Furniture> = ranked.into_iter().map(|(.., f)| f).collect();
+
+    // The room leaves free where parts were seen to go, and limits what nobody saw.
+    limits::within_observed(&mut furniture, &ranks);
+    let surroundings = scene.surroundings.as_ref().filter(|_| config.room);
+    let room = surroundings.map_or_else(Vec::new, |cells| room::boxes(cells, &furniture, config));
+    limits::beyond_observed(&mut furniture, &room);
+    for (piece, joint) in furniture.iter_mut().zip(joints) {
+        resist(&mut piece.part, &hands(scene, joint), up, config);
     }
+    Twin { name: scene.recording.clone(), density_kg_per_m3: config.density_kg_per_m3, furniture, room, left_out }
+}
+
+/// The hands of a joint's clips, in the order of time.
+fn hands<'a>(scene: &'a Scene, joint: &SceneJoint) -> Vec<&'a Trajectory> {
+    let mut hands: Vec<&Trajectory> = scene
+        .clips
+        .iter()
+        .filter(|c| joint.clips.contains(&c.clip.clip))
+        .filter_map(|c| c.trajectory.as_ref())
+        .filter(|t| !t.samples.is_empty())
+        .collect();
+    let start = |t: &Trajectory| t.samples.first().map_or(f64::NEG_INFINITY, |s| s.time_secs);
+    hands.sort_by(|&a, &b| start(a).total_cmp(&start(b)));
+    hands
+}
+
+/// Damping, friction and whether a spring carries the weight, as far as the hands show them.
+fn resist(part: &mut Part, hands: &[&Trajectory], up: &Vector, config: &config::Fitting) {
+    let density = config.density_kg_per_m3;
+    let left = resistance::left_open(&part.joint.articulation, hands);
+    let table = [part.joint.damping, part.joint.friction];
+    if let Some([damping, friction]) = resistance::seen(part, &left, table, up, density) {
+        part.joint.damping = damping;
+        part.joint.friction = friction;
+        part.joint.resistance_seen = true;
+    }
+    // Left open is what hangs about where the hand let go of it.
+    let stayed: Vec<f64> = left.iter().filter(|l| l.found >= 0.5 * l.released).map(|l| l.found).collect();
+    part.joint.balanced = limits::balanced(part, up, density, &stayed);
 }
 
 /// Builds a piece that shares no space with what stands already: with a shallower carcass (pieces that meet at a corner),
@@ -132,7 +175,7 @@ fn plan<'a>(joint: &'a SceneJoint, up: &Vector, config: &config::Fitting) -> Pla
     }
     let (rect, seen) = rectangle(joint, &articulation, &face);
     let observed = joint.observed_range;
-    Plan { joint, observed, articulation, face, rect, seen }
+    Plan { joint, observed, articulation, face, rect, seen, up: *up }
 }
 
 /// Whether a face can be the front of what moves: a drawer is not pulled along a lid or a worktop.
@@ -257,9 +300,10 @@ fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
 
     let carcass_out = [-depth, -board - gap];
     let slide = plan.articulation.kind == JointKind::Prismatic;
-    let mut upper = plan.observed;
+    // How far the part can go at all.
+    let mut most = std::f64::consts::PI;
     // A sliding door runs along its face and has no tray behind it.
-    if slide && plan.articulation.axis.dot(&face.normal) > 0.9 {
+    if limits::comes_out(&plan.articulation, face) {
         let tray = [-(depth - board - 2.0 * gap), -board];
         let inner_r = [r[0] + board + 2.0 * gap, r[1] - board - 2.0 * gap];
         // A tray's walls are lower than its front.
@@ -274,11 +318,11 @@ fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
             let above = [inner_u[0] + thin, inner_u[1]];
             solids.push(solid("tray_back", Role::Tray, [between, above, [tray[0], tray[0] + thin]], false));
         }
-        upper = upper.min(tray[1] - tray[0]);
+        most = tray[1] - tray[0];
     } else if slide {
         // A sliding door stays in its frame.
         let axis = plan.articulation.axis;
-        upper = upper.min(axis.dot(&face.right).abs() * (r[1] - r[0]) + axis.dot(&face.up).abs() * (u[1] - u[0]));
+        most = axis.dot(&face.right).abs() * (r[1] - r[0]) + axis.dot(&face.up).abs() * (u[1] - u[0]);
     }
     let deep = carcass_out[0];
     let between_r = [r[0] + board, r[1] - board];
@@ -297,7 +341,6 @@ fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
     } else {
         (config.hinge_damping, config.hinge_friction)
     };
-    let least = if slide { 0.01 } else { 0.02 };
     let bounds = bounds_of(&solids, face);
     let mut articulation = plan.articulation;
     articulation.origin = match articulation.kind {
@@ -314,9 +357,9 @@ fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
             label: word.to_owned(),
             joint: Joint {
                 articulation,
-                upper: upper.clamp(least, std::f64::consts::PI),
+                upper: plan.observed.min(most).max(limits::least(plan.articulation.kind)),
                 observed: plan.observed,
-                expected: plan.observed,
+                expected: limits::expected(&plan.articulation, face, &plan.up, plan.observed, depth, most),
                 damping,
                 friction,
                 resistance_seen: false,
@@ -397,6 +440,8 @@ mod tests {
             clips: vec![],
             furniture: None,
             type_probability: 1.0,
+            axis_probability: 1.0,
+            hinge_std_m: None,
             grip: Point::new(0.2, -0.035, 0.8),
             face: Some(face),
             part: Some(Rect { bounds: [[-0.5, 0.06], [-0.3, 0.1]] }),
@@ -412,6 +457,7 @@ mod tests {
             depth_factors: Default::default(),
             clips: vec![],
             joints,
+            surroundings: None,
         };
         fit(&scene, &Vector::z(), &config::Fitting::default())
     }

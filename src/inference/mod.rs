@@ -106,16 +106,14 @@ pub fn infer(
         JointKind::Revolute => crate::math::centroid(&path).map_or(joint.origin, |c| joint.line().project(&c)),
         JointKind::Prismatic => path[0],
     };
-    let total: f64 = ranked.iter().map(|(w, _)| (w - ranked[0].0).exp()).sum();
-    let agreeing: f64 =
-        ranked.iter().filter(|(_, c)| same_axis(&c.joint, &best.joint)).map(|(w, _)| (w - ranked[0].0).exp()).sum();
+    let all: Vec<(Articulation, f64)> = ranked.iter().map(|(w, c)| (c.joint, (w - ranked[0].0).exp())).collect();
     let grip = trajectory.closed_grip();
     Outcome::Found(ClipJoint {
         joint,
         contact_pivot,
         source: best.source,
         type_probability: revolute_probability.max(1.0 - revolute_probability),
-        axis_probability: agreeing / total,
+        axis_probability: agreeing_share(&best.joint, &all),
         residual_m: residual,
         inliers,
         radius_m,
@@ -159,6 +157,15 @@ pub fn opening_sense<'a>(
     }
     let opened: f64 = trajectories.map(|t| joint.opening_at(&t.closed_grip(), &t.open_grip())).sum();
     if opened < 0.0 { joint.reversed() } else { joint }
+}
+
+/// Of the weight of all joints of `best`'s type the share of those that are the same explanation.
+#[must_use]
+pub fn agreeing_share(best: &Articulation, all: &[(Articulation, f64)]) -> f64 {
+    let of_type = || all.iter().filter(|(j, _)| j.kind == best.kind);
+    let total: f64 = of_type().map(|(_, w)| w).sum();
+    let agreeing: f64 = of_type().filter(|(j, _)| same_axis(j, best)).map(|(_, w)| w).sum();
+    if total > 0.0 { agreeing / total } else { 0.0 }
 }
 
 /// Whether two joints are one explanation: directions within 8 degrees, hinges within 8 cm.

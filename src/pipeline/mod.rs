@@ -1,6 +1,7 @@
 //! The whole paper on one screen: every step in order, every intermediate kept.
 
 mod clip;
+mod room;
 mod scene;
 
 use std::collections::BTreeMap;
@@ -22,6 +23,7 @@ use crate::reasoning::words::Words;
 use crate::reasoning::{Answer, Reasoner};
 use crate::recording::sketch::Sketch;
 use crate::recording::{Clip, DepthFactors, Recording};
+pub use room::{RoomCell, RoomCells};
 
 /// Everything that was found out about one clip, step by step.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -64,6 +66,10 @@ pub struct SceneJoint {
     pub furniture: Option<String>,
     /// Probability of the type.
     pub type_probability: f64,
+    /// Probability that the axis is right, given that the type is.
+    pub axis_probability: f64,
+    /// Standard deviation of a hinge across its axis, metres; `None` for slides and where the open state was not seen.
+    pub hinge_std_m: Option<f64>,
     /// The grip when closed, world.
     pub grip: Point,
     /// The touched face.
@@ -89,6 +95,9 @@ pub struct Scene {
     pub clips: Vec<ClipResult>,
     /// Joints in the order of their first clip.
     pub joints: Vec<SceneJoint>,
+    /// What stands around; `None` where it was not asked for or not seen.
+    #[serde(default)]
+    pub surroundings: Option<RoomCells>,
 }
 
 /// Told how far the work is: (step, done, total).
@@ -200,8 +209,9 @@ pub fn infer(
         })
         .collect::<Result<_>>()?;
     let joints = scene::merge(&rectified, &looks.sketches, &clips, reasoner, config);
+    let surroundings = room::cells(&rectified, &looks.sketches, room.as_ref(), &config.fitting);
     let Recording { name: recording, depth_factors, .. } = rectified;
-    Ok(Scene { recording, manhattan: room, depth_factors, clips, joints })
+    Ok(Scene { recording, manhattan: room, depth_factors, clips, joints, surroundings })
 }
 
 /// What was kept of the frames that were looked at.

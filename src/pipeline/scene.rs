@@ -114,6 +114,7 @@ fn merge_group(
     let grip = best_joint.grip;
     let face = clips[best].face;
     let (mut joint, mut type_probability) = (best_joint.joint, best_joint.type_probability);
+    let mut axis_probability = best_joint.axis_probability;
     if group.len() > 1 {
         let paths: Vec<Vec<Point>> =
             group.iter().filter_map(|&c| clips[c].trajectory.as_ref()).map(Trajectory::positions).collect();
@@ -179,6 +180,7 @@ fn merge_group(
                 pooled.iter().zip(&weights).map(|(k, w)| (k.joint, (w - weights[top]).exp())).collect();
             joint = aggregate::consensus(&pooled[top].joint, &all);
             type_probability = revolute_probability.max(1.0 - revolute_probability);
+            axis_probability = inference::agreeing_share(&pooled[top].joint, &all);
         }
     }
     let trajectories = || group.iter().filter_map(|&c| clips[c].trajectory.as_ref());
@@ -216,6 +218,8 @@ fn merge_group(
             .find_map(|&c| narration::read(&clips[c].clip).furniture)
             .or_else(|| group.iter().find_map(|&c| clips[c].words.as_ref()?.furniture.clone())),
         type_probability,
+        axis_probability,
+        hinge_std_m,
         grip,
         face,
         part,

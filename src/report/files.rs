@@ -150,6 +150,7 @@ pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
             row.range = joint.clips.iter().zip(&joint.moved).find(|(name, _)| **name == c.clip.clip).map(|(_, r)| *r);
             row.part_box = part.map(|p| p.bounds);
             row.confidence = Some(joint.type_probability);
+            row.joint_confidence = Some(joint.type_probability * joint.axis_probability);
             row.joint = Some(joint.id.clone());
             row
         })

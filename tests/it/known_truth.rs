@@ -2,6 +2,7 @@
 
 use paws_twin::articulation::JointKind;
 use paws_twin::evaluation::{Report, Rule, Truth, evaluate};
+use paws_twin::fitting::overlap;
 use paws_twin::report::files::predictions;
 use paws_twin::synth::{Options, Tier};
 
@@ -30,6 +31,32 @@ fn without_noise_every_joint_is_right_to_a_degree_and_a_few_centimetres() {
         // A slide's line may run anywhere along its front: origins of slides are exempt in every rule.
         assert!(m.kind == JointKind::Prismatic || m.truth_to_line_m.unwrap() < 0.04, "{clip:?}");
     }
+}
+
+#[test]
+fn parts_open_as_far_as_expected_and_touch_neither_neighbours_nor_the_room() {
+    let dir = tempfile::tempdir().unwrap();
+    record(&Options { seed: 105, tier: Tier::Clean, width: 320, parts: 6 }, dir.path());
+    let (_, _, twin) = twin_of(dir.path());
+    assert!(!twin.room.is_empty(), "nothing of the room was built");
+    for (i, f) in twin.furniture.iter().enumerate() {
+        let joint = &f.part.joint;
+        assert!(joint.expected >= joint.upper && joint.upper > 0.0, "{joint:?}");
+        let others = twin.furniture.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, f)| f);
+        let closed = others.flat_map(|f| f.carcass.iter().chain(&f.part.solids));
+        let around: Vec<_> = closed.chain(&twin.room).collect();
+        for step in 0..=60 {
+            let motion = joint.articulation.motion(joint.upper * f64::from(step) / 60.0);
+            for solid in &f.part.solids {
+                let moved = solid.shape.moved(&motion);
+                for other in &around {
+                    assert!(!overlap::boxes(&moved, &other.shape), "{} in {} at {step}", solid.name, other.name);
+                }
+            }
+        }
+    }
+    let further = twin.furniture.iter().filter(|f| f.part.joint.upper > f.part.joint.observed + 0.02).count();
+    assert!(2 * further > twin.furniture.len(), "{further} of {} open further than seen", twin.furniture.len());
 }
 
 #[test]

@@ -1,0 +1,358 @@
+//! How far a part opens: what was observed, what a person would expect, and what stands in the way (ours).
+//!
+//! A recording shows an excursion, not a stop. The rule, by the geometry of the furniture and never by its name:
+//!
+//! | opens as | expected |
+//! |---|---|
+//! | leaf on an upright hinge | [`DOOR_DEG`] |
+//! | leaf hinged below (oven, dishwasher) | [`FRONT_DEG`] |
+//! | leaf hinged above (flap) | [`FRONT_DEG`] |
+//! | lid on a level face | [`LID_DEG`] |
+//! | drawer | [`DRAWER_SHARE`] of its carcass's depth |
+//! | leaf that slides along its face | its width less [`SLIDER_OVERLAP_M`] |
+//!
+//! and never less than what was observed, nor further than the tray is long or the leaf wide. The limit is the largest
+//! opening up to there at which the part touches nothing while all else is closed: not its neighbours, nor its own carcass,
+//! nor the room. Where the recorded hand went the recording is believed: boards of less sure furniture that were assumed to
+//! stand there go, the room is built around it (`room.rs`), and the limit falls below what was observed only where seen or
+//! surer furniture stands in the way. [`crate::twin::Joint`] keeps observed, expected and limit, so that all of this can be
+//! read off.
+
+use crate::articulation::{Articulation, JointKind};
+use crate::geometry::Face;
+use crate::math::{Point, Pose, Vector};
+use crate::twin::{Furniture, OrientedBox, Part, Role, Solid};
+
+use super::overlap;
+
+/// A person opens a door until it is out of the way; hinges of cupboards stop between 95 and 120 degrees.
+const DOOR_DEG: f64 = 110.0;
+/// Fronts that come down or go up end level.
+const FRONT_DEG: f64 = 90.0;
+/// A lid leans back a little, so that it stays.
+const LID_DEG: f64 = 100.0;
+/// Runners keep a fifth of the drawer inside.
+const DRAWER_SHARE: f64 = 0.8;
+/// Of a sliding leaf this much stays behind the next one.
+const SLIDER_OVERLAP_M: f64 = 0.03;
+
+/// The ends of an observed motion are known to about this: radians for hinges, metres for slides.
+const OBSERVED_NOISE: [f64; 2] = [0.09, 0.03];
+/// Least limit, rad or m: a joint has a range.
+const LEAST: [f64; 2] = [0.02, 0.01];
+/// Openings between two looks at what is in the way, rad or m.
+const STEP: [f64; 2] = [1.0 / 180.0 * std::f64::consts::PI, 0.005];
+
+/// The one of two numbers that belongs to a kind of joint.
+fn of(kind: JointKind, hinge_slide: [f64; 2]) -> f64 {
+    match kind {
+        JointKind::Revolute => hinge_slide[0],
+        JointKind::Prismatic => hinge_slide[1],
+    }
+}
+
+/// Least limit of a joint, rad or m.
+pub(super) fn least(kind: JointKind) -> f64 {
+    of(kind, LEAST)
+}
+
+/// How well the end of an observed motion is known, rad or m.
+pub(super) fn noise(kind: JointKind) -> f64 {
+    of(kind, OBSERVED_NOISE)
+}
+
+/// Whether a slide comes out of its face: a drawer, with a tray behind its front.
+pub(super) fn comes_out(articulation: &Articulation, face: &Face) -> bool {
+    articulation.kind == JointKind::Prismatic && articulation.axis.dot(&face.normal) > 0.9
+}
+
+/// The opening that a person would expect, rad or m: at least `observed`. `depth` is the carcass's; `most` is how far the
+/// part can go at all.
+pub(super) fn expected(
+    articulation: &Articulation,
+    face: &Face,
+    up: &Vector,
+    observed: f64,
+    depth: f64,
+    most: f64,
+) -> f64 {
+    let usual = match articulation.kind {
+        JointKind::Prismatic if comes_out(articulation, face) => DRAWER_SHARE * depth,
+        JointKind::Prismatic => most - SLIDER_OVERLAP_M,
+        JointKind::Revolute if articulation.axis.dot(up).abs() > 0.5 => DOOR_DEG.to_radians(),
+        JointKind::Revolute if face.is_horizontal(up) => LID_DEG.to_radians(),
+        JointKind::Revolute => FRONT_DEG.to_radians(),
+    };
+    usual.max(observed).min(most).max(least(articulation.kind))
+}
+
+/// Openings from `from` to `to` (rad or m) that are at most `step` apart, both ends among them, with the part's motions.
+pub(super) fn motions(part: &Part, from: f64, to: f64, step: f64) -> Vec<(f64, Pose)> {
+    /// More poses tell nothing more.
+    const MOST: f64 = 2000.0;
+    let count = ((to - from).max(0.0) / step).ceil().clamp(1.0, MOST) as usize;
+    (0..=count)
+        .map(|i| from + (to - from) * i as f64 / count as f64)
+        .map(|q| (q, part.joint.articulation.motion(q)))
+        .collect()
+}
+
+/// A part on its way from one opening to another.
+struct Way<'a> {
+    part: &'a Part,
+    /// rad or m.
+    from: f64,
+    to: f64,
+    poses: Vec<(f64, Pose)>,
+    bounds: Bounds,
+}
+
+impl<'a> Way<'a> {
+    fn of(part: &'a Part, from: f64, to: f64) -> Self {
+        let poses = motions(part, from, to, of(part.joint.articulation.kind, STEP));
+        let corners = poses.iter().flat_map(|(_, m)| part.solids.iter().flat_map(move |s| s.shape.moved(m).corners()));
+        let bounds = Bounds::of(corners);
+        Self { part, from, to, poses, bounds }
+    }
+
+    /// The largest opening before the part touches one of the obstacles, one step short of it; the end of the way where it
+    /// touches none. Nothing is said about the start.
+    fn free(&self, obstacles: &[OrientedBox]) -> f64 {
+        let step = of(self.part.joint.articulation.kind, STEP);
+        // What the part never comes near is not asked about at every step.
+        let near: Vec<&OrientedBox> =
+            obstacles.iter().filter(|o| self.bounds.meets(&Bounds::of(o.corners()))).collect();
+        if near.is_empty() {
+            return self.to;
+        }
+        let touches = |motion: &Pose| {
+            self.part.solids.iter().any(|s| {
+                let moved = s.shape.moved(motion);
+                near.iter().any(|o| overlap::boxes(&moved, o))
+            })
+        };
+        let contact = self.poses.iter().skip(1).find(|(_, motion)| touches(motion));
+        contact.map_or(self.to, |(q, _)| (q - 2.0 * step).max(self.from))
+    }
+}
+
+/// Bounds along the world's axes.
+#[derive(Debug, Clone, Copy)]
+struct Bounds {
+    low: Vector,
+    high: Vector,
+}
+
+impl Bounds {
+    fn of(points: impl IntoIterator<Item = Point>) -> Self {
+        let empty = Self { low: Vector::repeat(f64::INFINITY), high: Vector::repeat(f64::NEG_INFINITY) };
+        points.into_iter().fold(empty, |b, p| Self { low: b.low.inf(&p.coords), high: b.high.sup(&p.coords) })
+    }
+
+    fn meets(&self, other: &Self) -> bool {
+        /// Between two poses a corner leaves the bounds of both by less.
+        const SLACK_M: f64 = 0.01;
+        (0..3).all(|k| self.low[k] - SLACK_M <= other.high[k] && other.low[k] - SLACK_M <= self.high[k])
+    }
+}
+
+/// Everything of a piece of furniture, closed.
+fn closed(piece: &Furniture) -> impl Iterator<Item = OrientedBox> {
+    piece.carcass.iter().chain(&piece.part.solids).map(|s| s.shape)
+}
+
+/// Sets each limit within what was observed: up to what stands in the way. `ranks[i]` is the place of piece `i` in the
+/// order of sureness, 0 first; assumed boards of less sure pieces give way.
+pub(super) fn within_observed(furniture: &mut [Furniture], ranks: &[usize]) {
+    let mut order: Vec<usize> = (0..furniture.len().min(ranks.len())).collect();
+    order.sort_by_key(|&i| ranks[i]);
+    for &i in &order {
+        let part = furniture[i].part.clone();
+        let kind = part.joint.articulation.kind;
+        let seen = part.joint.upper;
+        // At the very end of the motion it is the observation that may be wrong.
+        let sure = (seen - noise(kind)).max(0.0);
+        let way = Way::of(&part, 0.0, sure);
+        let in_the_way = |s: &Solid| s.role == Role::Carcass && !s.seen && way.free(&[s.shape]) < sure;
+        for &j in order.iter().filter(|&&j| ranks[j] > ranks[i]) {
+            let carcass = &mut furniture[j].carcass;
+            let (gone, mut left): (Vec<Solid>, Vec<Solid>) = carcass.drain(..).partition(in_the_way);
+            // A piece keeps one board to hang its part on.
+            if left.is_empty() {
+                left.extend(gone.into_iter().take(1));
+            }
+            *carcass = left;
+        }
+        let others: Vec<OrientedBox> = order.iter().filter(|&&j| j != i).flat_map(|&j| closed(&furniture[j])).collect();
+        let upper = Way::of(&part, 0.0, seen).free(&others).max(least(kind));
+        furniture[i].part.joint.upper = upper;
+    }
+}
+
+/// Lets each limit grow up to what is expected, as far as neighbours, the own carcass and the room leave it free.
+pub(super) fn beyond_observed(furniture: &mut [Furniture], room: &[Solid]) {
+    for i in 0..furniture.len() {
+        let part = furniture[i].part.clone();
+        let (from, to) = (part.joint.upper, part.joint.expected);
+        if to <= from {
+            continue;
+        }
+        let others = furniture.iter().enumerate().filter(|(j, _)| *j != i).flat_map(|(_, f)| closed(f));
+        let fixed = furniture[i].carcass.iter().chain(room).map(|s| s.shape);
+        let obstacles: Vec<OrientedBox> = others.chain(fixed).collect();
+        furniture[i].part.joint.upper = Way::of(&part, from, to).free(&obstacles);
+    }
+}
+
+/// Whether a part's weight has to be carried by a spring: hinges that are not upright only.
+///
+/// A leaf that its weight opens from the first crack (hinged below: ovens, dishwashers) would never stay shut without one. A
+/// leaf that its weight shuts (flaps, lids) has one where a hand let go of it open and it stayed: `left_open` lists the
+/// openings, rad, at which that was seen.
+pub(super) fn balanced(part: &Part, up: &Vector, density: f64, left_open: &[f64]) -> bool {
+    /// Ajar: past the catch, radians.
+    const AJAR_RAD: f64 = 0.09;
+    /// A lever of gravity that friction does not hold, metres.
+    const LEVER_M: f64 = 0.005;
+    let phi = part.joint.articulation;
+    if phi.kind != JointKind::Revolute || phi.axis.dot(up).abs() > 0.5 {
+        return false;
+    }
+    let Some(mass) = crate::twin::mass_properties(&part.solids, density) else { return false };
+    // Torque for each newton of weight; positive opens.
+    let lever = |q: f64| phi.axis.dot(&(phi.motion(q) * mass.center - phi.origin).cross(&-up));
+    lever(AJAR_RAD) > LEVER_M || left_open.iter().any(|&q| q > 4.0 * AJAR_RAD && lever(q) < -LEVER_M)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::twin::Joint;
+    use nalgebra::Matrix3;
+
+    fn solid(role: Role, seen: bool, center: [f64; 3], half: [f64; 3]) -> Solid {
+        let shape =
+            OrientedBox { center: Point::from(center), half: Vector::from(half), rotation: Matrix3::identity() };
+        Solid { name: String::new(), role, shape, seen }
+    }
+
+    /// A piece whose front is 0.5 m wide and 0.7 m tall at y = 0, looking towards -y, its left edge at x = 0; the carcass is
+    /// its back alone.
+    fn piece(kind: JointKind, observed: f64, expected: f64) -> Furniture {
+        let front = solid(Role::Front, true, [0.25, 0.009, 0.35], [0.248, 0.009, 0.348]);
+        let back = solid(Role::Carcass, false, [0.25, 0.5, 0.35], [0.25, 0.009, 0.35]);
+        let axis = if kind == JointKind::Revolute { -Vector::z() } else { -Vector::y() };
+        Furniture {
+            name: String::new(),
+            carcass: vec![back],
+            part: Part {
+                id: String::new(),
+                label: String::new(),
+                joint: Joint {
+                    articulation: Articulation { kind, axis, origin: Point::new(0.0, 0.0, 0.35) },
+                    upper: observed,
+                    observed,
+                    expected,
+                    damping: 1.0,
+                    friction: 1.0,
+                    resistance_seen: false,
+                    balanced: false,
+                },
+                handle: Point::new(0.45, -0.03, 0.4),
+                bounds: front.shape,
+                solids: vec![front],
+            },
+        }
+    }
+
+    fn limit(pieces: &mut [Furniture], room: &[Solid]) -> f64 {
+        let ranks: Vec<usize> = (0..pieces.len()).collect();
+        within_observed(pieces, &ranks);
+        beyond_observed(pieces, room);
+        pieces[0].part.joint.upper
+    }
+
+    #[test]
+    fn a_door_seen_to_forty_degrees_opens_further_and_stops_before_the_wall() {
+        let door = piece(JointKind::Revolute, 0.7, DOOR_DEG.to_radians());
+        assert_eq!(limit(&mut [door.clone()], &[]), DOOR_DEG.to_radians());
+        // A wall across, 0.4 m before the front: the free edge meets it where 0.498 sin(q) is 0.4.
+        let wall = solid(Role::Room, true, [0.0, -0.5, 0.5], [3.0, 0.1, 1.0]);
+        let stop = limit(&mut [door.clone()], &[wall]);
+        let meets = (0.4f64 / 0.498).asin();
+        assert!(stop < meets && stop > meets - 4f64.to_radians(), "{stop} {meets}");
+        // Where the recorded hand went the room does not stop it: there the room is carved.
+        let mut further = [piece(JointKind::Revolute, 1.4, DOOR_DEG.to_radians())];
+        assert!(limit(&mut further, &[solid(Role::Room, true, [0.0, -0.5, 0.5], [3.0, 0.1, 1.0])]) >= 1.4);
+    }
+
+    #[test]
+    fn a_drawer_in_a_corner_stops_before_the_other_row_and_keeps_what_was_observed() {
+        // The other row faces this one, 0.3 m away: its front was seen, its side board is assumed.
+        let mut other = piece(JointKind::Prismatic, 0.1, 0.1);
+        other.part.solids = vec![solid(Role::Front, true, [0.25, -0.31, 0.35], [0.25, 0.009, 0.35])];
+        other.part.joint.articulation.axis = Vector::z();
+        other.carcass = vec![solid(Role::Carcass, false, [0.25, -0.7, 0.35], [0.25, 0.3, 0.35])];
+        let stop = limit(&mut [piece(JointKind::Prismatic, 0.2, 0.44), other.clone()], &[]);
+        assert!(stop < 0.301 && stop > 0.28, "{stop}");
+        // An assumed board in the observed way goes, the front does not.
+        let board = solid(Role::Carcass, false, [0.25, -0.1, 0.35], [0.25, 0.01, 0.35]);
+        other.carcass.push(board);
+        let mut pieces = [piece(JointKind::Prismatic, 0.2, 0.44), other];
+        let stop = limit(&mut pieces, &[]);
+        assert!(stop < 0.301 && stop > 0.28 && pieces[1].carcass.len() == 1, "{stop}");
+        let mut blocked = pieces.clone();
+        blocked[1].part.solids[0].shape.center.y = -0.1;
+        blocked[0].part.joint.upper = 0.2;
+        let stop = limit(&mut blocked, &[]);
+        assert!(stop < blocked[0].part.joint.observed && stop > 0.07, "{stop}");
+    }
+
+    #[test]
+    fn what_is_expected_follows_from_the_shape_and_never_falls_below_what_was_observed() {
+        let face = |normal: Vector, up: Vector| Face {
+            center: Point::origin(),
+            right: up.cross(&normal),
+            up,
+            normal,
+            extent: [[-0.3, 0.3]; 2],
+            support: 1.0,
+        };
+        let front = face(-Vector::y(), Vector::z());
+        let lid = face(Vector::z(), Vector::y());
+        let hinge = |axis: Vector| Articulation { kind: JointKind::Revolute, axis, origin: Point::new(0.0, 0.0, 0.4) };
+        let slide = |axis: Vector| Articulation { kind: JointKind::Prismatic, axis, origin: Point::origin() };
+        let turn = std::f64::consts::PI;
+        let degrees = |phi: Articulation, face: &Face, observed: f64| {
+            expected(&phi, face, &Vector::z(), observed, 0.5, turn).to_degrees()
+        };
+        assert!((degrees(hinge(Vector::z()), &front, 0.7) - DOOR_DEG).abs() < 1e-9);
+        assert!((degrees(hinge(Vector::z()), &front, 2.2) - 2.2f64.to_degrees()).abs() < 1e-9);
+        assert!((degrees(hinge(Vector::x()), &front, 0.7) - FRONT_DEG).abs() < 1e-9);
+        assert!((degrees(hinge(Vector::x()), &lid, 0.7) - LID_DEG).abs() < 1e-9);
+        let metres =
+            |phi: Articulation, observed: f64, most: f64| expected(&phi, &front, &Vector::z(), observed, 0.5, most);
+        assert!((metres(slide(-Vector::y()), 0.2, 0.476) - 0.4).abs() < 1e-12);
+        assert!((metres(slide(-Vector::y()), 0.6, 0.476) - 0.476).abs() < 1e-12);
+        assert!((metres(slide(Vector::x()), 0.2, 0.6) - 0.57).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_its_weight_opens_is_balanced_and_a_flap_only_where_it_stayed() {
+        let up = Vector::z();
+        let mut oven = piece(JointKind::Revolute, 1.0, 1.6).part;
+        oven.joint.articulation =
+            Articulation { kind: JointKind::Revolute, axis: Vector::x(), origin: Point::new(0.25, 0.0, 0.0) };
+        let mut flap = oven.clone();
+        flap.joint.articulation.origin.z = 0.7;
+        flap.joint.articulation.axis = -Vector::x();
+        // Both open towards -y.
+        for part in [&oven, &flap] {
+            let middle = part.joint.articulation.motion(0.5) * part.bounds.center;
+            assert!(middle.y < -0.05, "{middle:?}");
+        }
+        assert!(balanced(&oven, &up, 700.0, &[]));
+        assert!(!balanced(&flap, &up, 700.0, &[]) && balanced(&flap, &up, 700.0, &[1.2]));
+        assert!(!balanced(&piece(JointKind::Revolute, 1.0, 1.6).part, &up, 700.0, &[1.2]));
+    }
+}

@@ -1,0 +1,330 @@
+//! Where the part stands in each view of the open state, and with that where its hinge is (ours).
+//!
+//! A hand tells how far a door is open to its own error, centimetres for a whole clip. The depth of the leaf tells it as
+//! well as the leaf is seen: leaf and front meet at the hinge, so a leaf that is seen at two angles gives the hinge and both
+//! angles. Starting from a joint and the hand's openings, this is a least-squares fit of the leaf to the views' depth.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::Face;
+use super::moved::{Rect, View};
+use crate::articulation::{Articulation, JointKind};
+use crate::math::{Point, Vector, any_orthogonal, reject, unit};
+
+/// The views of one clip's open state, with the grip when closed as that clip's hand has it.
+#[derive(Debug, Clone, Copy)]
+pub struct OpenState<'a> {
+    /// World.
+    pub grip: Point,
+    /// See [`super::moved::open_views`].
+    pub views: &'a [View<'a>],
+}
+
+/// An opening and how well the views tell it, both rad or m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Opening {
+    /// Opening against the closed state.
+    pub value: f64,
+    /// Standard deviation.
+    pub std: f64,
+}
+
+/// What the depth of the open state says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Refit {
+    /// The joint with its hinge moved across its axis; a slide stays as it is.
+    pub joint: Articulation,
+    /// One entry a view of each clip, in the order given.
+    pub openings: Vec<Vec<Opening>>,
+    /// Standard deviation of the hinge across its axis in its least sure direction, metres; 0 for slides.
+    pub position_std_m: f64,
+}
+
+/// What is believed before the depth is looked at, and how well depth is measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Standard deviation of the hinge given, across its axis, metres.
+    pub hinge_m: f64,
+    /// Standard deviation of the hand along the motion, metres.
+    pub hand_m: f64,
+    /// Thickness of the leaf: a view of its back sees it that much behind its front, metres.
+    pub board_m: f64,
+}
+
+/// Error of a frame's depth of one surface, metres: one that all its points share, and what they have of their own. The
+/// latter bends over a few decimetres, so a leaf is worth few points.
+const SHARED_STD_M: f64 = 0.01;
+const OWN_STD_M: f64 = 0.015;
+const INDEPENDENT: f64 = 30.0;
+/// How well the plane of the front is known, and with it a hinge across it, metres.
+const PLANE_STD_M: f64 = 0.015;
+/// Degrees of freedom of the hand's error: few, as some hands are lost before a part is closed.
+const TAIL: f64 = 2.0;
+/// Points of the leaf that are compared, each way.
+const STEPS: usize = 14;
+/// Beyond this a view looks past the leaf or at what hides it, metres: loose while the opening is unsure, then tight.
+const LOOSE_M: f64 = 0.08;
+const TIGHT_M: f64 = 0.03;
+/// A leaf seen at less than this slant (cosine) shows its edge.
+const GRAZING: f64 = 0.2;
+
+/// One view of one clip with the opening that the hand gives.
+struct Seen<'a> {
+    view: &'a View<'a>,
+    hand: f64,
+    /// Radian or metre that the hand's error is worth.
+    std: f64,
+}
+
+/// Fits the hinge and the opening in every view. `None` where no view sees enough of the leaf in motion.
+#[must_use]
+pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState], noise: &Noise) -> Option<Refit> {
+    let seen: Vec<Vec<Seen>> = clips
+        .iter()
+        .map(|clip| {
+            let lever = match joint.kind {
+                JointKind::Prismatic => 1.0,
+                JointKind::Revolute => joint.line().distance(&clip.grip).max(0.1),
+            };
+            let std = noise.hand_m / lever;
+            clip.views.iter().map(|view| Seen { view, hand: joint.opening_at(&clip.grip, &view.grip), std }).collect()
+        })
+        .collect();
+    let leaf = Leaf::of(face, rect, noise.board_m);
+    // One offset a clip first (a hand is off by as much all along a clip), then each view by itself.
+    let mut offsets: Vec<Vec<f64>> = seen
+        .iter()
+        .map(|views| {
+            let common = coarse(&leaf, joint, views);
+            vec![common; views.len()]
+        })
+        .collect();
+    let mut shift = [0.0; 2];
+    let mut shared = vec![0.0; offsets.iter().map(Vec::len).sum()];
+    let (e1, e2) = across(joint, face);
+    let flat: Vec<&Seen> = seen.iter().flatten().collect();
+    let mut scale = LOOSE_M;
+    let mut fit = None;
+    for _ in 0..10 {
+        let moved = shifted(joint, &e1, &e2, shift);
+        let flat_offsets: Vec<f64> = offsets.iter().flatten().copied().collect();
+        let step =
+            normal_equations(&leaf, joint, &moved, [&e1, &e2], shift, &flat, &flat_offsets, &shared, scale, noise)?;
+        let solved = step.matrix.clone().cholesky()?;
+        let change = solved.solve(&step.vector);
+        if !change.iter().all(|x| x.is_finite()) {
+            return None;
+        }
+        for k in 0..2 {
+            shift[k] += change[k];
+        }
+        for (offset, change) in offsets.iter_mut().flatten().zip(change.iter().skip(2).step_by(2)) {
+            *offset += change;
+        }
+        for (bias, change) in shared.iter_mut().zip(change.iter().skip(3).step_by(2)) {
+            *bias += change;
+        }
+        scale = (scale * 0.75).max(TIGHT_M);
+        fit = Some((solved.inverse(), step.points));
+    }
+    let (covariance, points) = fit?;
+    // Fewer points are noise.
+    if points < super::moved::MIN_POINTS {
+        return None;
+    }
+    let hinge = covariance.view((0, 0), (2, 2)).into_owned();
+    let position_std_m = match joint.kind {
+        JointKind::Prismatic => 0.0,
+        JointKind::Revolute => hinge.symmetric_eigen().eigenvalues.max().max(0.0).sqrt(),
+    };
+    let mut index = 2;
+    let openings = seen
+        .iter()
+        .zip(&offsets)
+        .map(|(views, offsets)| {
+            views
+                .iter()
+                .zip(offsets)
+                .map(|(s, offset)| {
+                    let std = covariance[(index, index)].max(0.0).sqrt();
+                    index += 2;
+                    Opening { value: s.hand + offset, std }
+                })
+                .collect()
+        })
+        .collect();
+    Some(Refit { joint: shifted(joint, &e1, &e2, shift), openings, position_std_m })
+}
+
+/// Directions across a hinge: out of the front, and along it.
+fn across(joint: &Articulation, face: &Face) -> (Vector, Vector) {
+    let e1 = unit(&reject(&face.normal, &joint.axis)).unwrap_or_else(|| any_orthogonal(&joint.axis));
+    (e1, joint.axis.cross(&e1))
+}
+
+fn shifted(joint: &Articulation, e1: &Vector, e2: &Vector, shift: [f64; 2]) -> Articulation {
+    Articulation { origin: joint.origin + e1 * shift[0] + e2 * shift[1], ..*joint }
+}
+
+/// Points of a leaf, closed, world, with its outward normal.
+struct Leaf {
+    points: Vec<Point>,
+    normal: Vector,
+    board_m: f64,
+}
+
+impl Leaf {
+    fn of(face: &Face, rect: &Rect, board_m: f64) -> Self {
+        // The rim is where an outline is off by a cell.
+        const RIM: f64 = 0.06;
+        let at = |k: usize, b: [f64; 2]| {
+            let share = RIM + (1.0 - 2.0 * RIM) * (k as f64 + 0.5) / STEPS as f64;
+            b[0] + (b[1] - b[0]) * share
+        };
+        let points = (0..STEPS * STEPS)
+            .map(|i| face.point(at(i % STEPS, rect.bounds[0]), at(i / STEPS, rect.bounds[1]), 0.0))
+            .collect();
+        Self { points, normal: face.normal, board_m }
+    }
+}
+
+/// How far the surface that a view sees lies from the leaf's point, along the leaf's normal there; with the point and the
+/// normal in the world. `None` where nothing is seen, at a grazing slant, or where the point has not left its closed place.
+fn displacement(
+    leaf: &Leaf,
+    point: &Point,
+    joint: &Articulation,
+    opening: f64,
+    view: &View,
+) -> Option<(f64, Point, Vector)> {
+    let motion = joint.motion(opening);
+    let normal = motion.rotation * leaf.normal;
+    let front = motion * point;
+    let ray = unit(&(front - view.eye))?;
+    let slant = normal.dot(&ray);
+    if slant.abs() < GRAZING {
+        return None;
+    }
+    // Seen from behind, the surface is the leaf's back.
+    let at = if slant < 0.0 { front } else { front - normal * leaf.board_m };
+    let (gap, depth) = view.gap(&at)?;
+    // Near its closed place the leaf cannot be told from what is behind it.
+    if (front - point).norm() < 2.0 * super::moved::tolerance(depth) {
+        return None;
+    }
+    let along_ray = gap * (at - view.eye).norm() / depth;
+    Some((along_ray * slant, at, normal))
+}
+
+fn weight(residual: f64, scale: f64) -> f64 {
+    let x = residual / scale;
+    1.0 / ((1.0 + x * x) * (1.0 + x * x))
+}
+
+/// The common offset of a clip's openings under which most of the leaf is seen in its place.
+fn coarse(leaf: &Leaf, joint: &Articulation, views: &[Seen]) -> f64 {
+    // In halves of the hand's standard deviation, ten of them to each side: a hand that was lost before the part was closed
+    // is off by decimetres.
+    const REACH: i32 = 20;
+    let Some(std) = views.first().map(|s| s.std) else { return 0.0 };
+    (-REACH..=REACH)
+        .map(|k| {
+            let x = f64::from(k) * 0.5;
+            let (mut there, mut count) = (0.0, 0usize);
+            for s in views {
+                for p in &leaf.points {
+                    if let Some((r, _, _)) = displacement(leaf, p, joint, s.hand + x * std, s.view) {
+                        there += weight(r, LOOSE_M * 0.5);
+                        count += 1;
+                    }
+                }
+            }
+            let share = if count >= super::moved::MIN_POINTS { there / count as f64 } else { 0.0 };
+            // Heavy-tailed, as hands are: one standard deviation costs about what 4 % of the leaf are worth, eight cost 35 %.
+            (share - 0.1 * (x * x / TAIL).ln_1p(), x * std)
+        })
+        .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.abs().total_cmp(&a.1.abs())))
+        .map_or(0.0, |(_, offset)| offset)
+}
+
+struct Equations {
+    matrix: DMatrix<f64>,
+    vector: DVector<f64>,
+    points: usize,
+}
+
+/// Gauss-Newton about the present state: two shifts of the hinge, then for each view an offset of its opening and the error
+/// that its depth shares.
+#[allow(clippy::too_many_arguments, reason = "the state of one fit")]
+fn normal_equations(
+    leaf: &Leaf,
+    start: &Articulation,
+    joint: &Articulation,
+    [e1, e2]: [&Vector; 2],
+    shift: [f64; 2],
+    seen: &[&Seen],
+    offsets: &[f64],
+    shared: &[f64],
+    scale: f64,
+    noise: &Noise,
+) -> Option<Equations> {
+    let size = 2 + 2 * seen.len();
+    let mut matrix = DMatrix::zeros(size, size);
+    let mut vector = DVector::zeros(size);
+    let information = match start.kind {
+        JointKind::Revolute => [PLANE_STD_M.powi(-2), noise.hinge_m.powi(-2)],
+        // A slide has no place: the shift is held at zero.
+        JointKind::Prismatic => [1e12; 2],
+    };
+    for k in 0..2 {
+        matrix[(k, k)] += information[k];
+        vector[k] -= information[k] * shift[k];
+    }
+    let mut points = 0;
+    for (i, ((s, offset), bias)) in seen.iter().zip(offsets).zip(shared).enumerate() {
+        let slot = 2 + 2 * i;
+        let told = (TAIL + 1.0) / (TAIL + (offset / s.std).powi(2)) / (s.std * s.std);
+        matrix[(slot, slot)] += told;
+        vector[slot] -= told * offset;
+        matrix[(slot + 1, slot + 1)] += SHARED_STD_M.powi(-2);
+        vector[slot + 1] -= bias / (SHARED_STD_M * SHARED_STD_M);
+        let opening = s.hand + offset;
+        let turn = joint.motion(opening).rotation;
+        let rows: Vec<([f64; 4], f64, f64)> = leaf
+            .points
+            .iter()
+            .filter_map(|p| {
+                let (r, at, normal) = displacement(leaf, p, joint, opening, s.view)?;
+                // How the leaf moves along its normal with each parameter.
+                let by_opening = match joint.kind {
+                    JointKind::Revolute => joint.axis.cross(&(at - joint.origin)),
+                    JointKind::Prismatic => joint.axis,
+                };
+                let by = |e: &Vector| match joint.kind {
+                    JointKind::Revolute => normal.dot(&(e - turn * e)),
+                    JointKind::Prismatic => 0.0,
+                };
+                let r = r - bias;
+                Some(([by(e1), by(e2), normal.dot(&by_opening), 1.0], r, weight(r, scale)))
+            })
+            .collect();
+        let total: f64 = rows.iter().map(|(_, _, w)| w).sum();
+        // Of a leaf of which less than a tenth is in its place nothing is known.
+        if total < 0.1 * rows.len() as f64 || total < 4.0 {
+            continue;
+        }
+        points += total as usize;
+        let worth = (INDEPENDENT / total).min(1.0) / (OWN_STD_M * OWN_STD_M);
+        let slots = [0, 1, slot, slot + 1];
+        for (j, r, w) in rows {
+            let w = w * worth;
+            for a in 0..4 {
+                vector[slots[a]] += w * j[a] * r;
+                for b in 0..4 {
+                    matrix[(slots[a], slots[b])] += w * j[a] * j[b];
+                }
+            }
+        }
+    }
+    matrix.iter().all(|x: &f64| x.is_finite()).then_some(Equations { matrix, vector, points })
+}

@@ -1,0 +1,185 @@
+//! What stands around and does not move: cells of a grid in which several views saw a surface (ours).
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::config;
+use crate::geometry::ManhattanFrame;
+use crate::localization::{self, views};
+use crate::math::{Point, Vector, any_orthogonal, reject, unit};
+use crate::recording::Recording;
+use crate::recording::sketch::Sketch;
+
+/// One cell with a surface in it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RoomCell {
+    /// Index along the grid's axes: `floor(coordinate / edge)`.
+    pub index: [i32; 3],
+    /// Distinct views that saw a surface in it.
+    pub views: u32,
+    /// `[low, high]` of the surface along the grid's axes, metres, within the cell: the even layer that has the mean and the
+    /// variance of the points.
+    pub extent: [[f64; 2]; 3],
+}
+
+/// The static scene on a grid.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RoomCells {
+    /// The grid's axes, world, orthonormal and right-handed: two along the room's walls, the upright one last.
+    pub axes: [Vector; 3],
+    /// Edge of a cell, metres.
+    pub edge_m: f64,
+    /// Cells that enough views saw, by index.
+    pub cells: Vec<RoomCell>,
+}
+
+/// Gathers the depth of frames in which nobody is at work, and the static reconstruction where there is one. `None` where
+/// the room is not wanted or nothing was seen of it.
+///
+/// Parts that were left open are in it: whoever builds them knows where they go and leaves that space free.
+pub(super) fn cells(
+    recording: &Recording,
+    sketches: &BTreeMap<usize, Sketch>,
+    manhattan: Option<&ManhattanFrame>,
+    config: &config::Fitting,
+) -> Option<RoomCells> {
+    /// Beyond three metres a metre-scale depth estimate is worth less than a voxel.
+    const NEAR_M: f64 = 3.0;
+    /// A cell at that distance still holds more than one of every other sample.
+    const STRIDE: usize = 2;
+    if !config.room {
+        return None;
+    }
+    let axes = grid_axes(manhattan, &recording.up());
+    let edge_m = config.room_voxel_m;
+    let needed = config.room_min_views as u32;
+    // A frame without depth of its own has the reconstruction's, which is taken whole below.
+    let still = |frame: usize| {
+        !views::interacting(recording, frame) && recording.frames.get(frame).is_some_and(|f| f.files.depth.is_some())
+    };
+    let by_view: Vec<Vec<Bin>> = sketches
+        .par_iter()
+        .filter(|(frame, _)| still(**frame))
+        .map(|(frame, sketch)| {
+            let eye = recording.frames[*frame].center();
+            let points = localization::points(recording, sketch, None);
+            let near = points.iter().step_by(STRIDE).filter(|p| (*p - eye).norm() <= NEAR_M);
+            folded(near.filter_map(|p| Bin::of(p, &axes, edge_m, 1)).collect(), |one, _| one)
+        })
+        .collect();
+    let mut bins: Vec<Bin> = by_view.into_iter().flatten().collect();
+    // A reconstruction has been through many views already. In pieces: it may have millions of points.
+    for points in recording.reconstruction.chunks(1 << 16) {
+        bins.extend(folded(points.iter().filter_map(|p| Bin::of(p, &axes, edge_m, needed)).collect(), |one, _| one));
+    }
+    let cells: Vec<RoomCell> = folded(bins, u32::saturating_add)
+        .iter()
+        .filter(|b| b.views >= needed)
+        .map(|b| RoomCell { index: b.index, views: b.views, extent: b.extent(edge_m) })
+        .collect();
+    (!cells.is_empty()).then_some(RoomCells { axes, edge_m, cells })
+}
+
+/// The heading of the room's frame about the vertical, or any: furniture is set upright, and so is what surrounds it.
+fn grid_axes(manhattan: Option<&ManhattanFrame>, up: &Vector) -> [Vector; 3] {
+    let first = manhattan.and_then(|m| unit(&reject(&m.axes[0], up))).unwrap_or_else(|| any_orthogonal(up));
+    [first, up.cross(&first), *up]
+}
+
+/// Points of one cell: their number and, from the cell's lower corner, the sums of their coordinates and squares.
+#[derive(Debug, Clone, Copy)]
+struct Bin {
+    index: [i32; 3],
+    views: u32,
+    count: f64,
+    sum: [f64; 3],
+    squares: [f64; 3],
+}
+
+impl Bin {
+    /// `None` for a point that is not in any room.
+    fn of(p: &Point, axes: &[Vector; 3], edge_m: f64, views: u32) -> Option<Self> {
+        /// No recording walks further from its world's origin.
+        const FAR_M: f64 = 1e5;
+        let at = axes.map(|a| a.dot(&p.coords));
+        if !at.iter().all(|c| c.abs() < FAR_M) {
+            return None;
+        }
+        let index = at.map(|c| (c / edge_m).floor() as i32);
+        let within: [f64; 3] = std::array::from_fn(|k| at[k] - f64::from(index[k]) * edge_m);
+        Some(Self { index, views, count: 1.0, sum: within, squares: within.map(|c| c * c) })
+    }
+
+    fn extent(&self, edge_m: f64) -> [[f64; 2]; 3] {
+        std::array::from_fn(|k| {
+            let mean = self.sum[k] / self.count;
+            let variance = (self.squares[k] / self.count - mean * mean).max(0.0);
+            // An even layer of half-width h has the variance h^2 / 3.
+            let half = (3.0 * variance).sqrt();
+            let corner = f64::from(self.index[k]) * edge_m;
+            [corner + (mean - half).max(0.0), corner + (mean + half).min(edge_m)]
+        })
+    }
+}
+
+/// One bin for each index, by index; `views` joins the views of two.
+fn folded(mut bins: Vec<Bin>, views: impl Fn(u32, u32) -> u32) -> Vec<Bin> {
+    // Stable: sums are taken in the order of the views, so that they are the same on any number of threads.
+    bins.sort_by_key(|b| b.index);
+    let mut out: Vec<Bin> = Vec::new();
+    for bin in bins {
+        match out.last_mut() {
+            Some(last) if last.index == bin.index => {
+                last.views = views(last.views, bin.views);
+                last.count += bin.count;
+                last.sum.iter_mut().zip(bin.sum).for_each(|(sum, more)| *sum += more);
+                last.squares.iter_mut().zip(bin.squares).for_each(|(sum, more)| *sum += more);
+            }
+            _ => out.push(bin),
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Evenly spread points of a wall at x = 0.12, twenty to a cell's edge.
+    fn wall(views: u32) -> Vec<Bin> {
+        let axes = [Vector::x(), Vector::y(), Vector::z()];
+        let mut bins = Vec::new();
+        for view in 0..views {
+            for i in 0..400 {
+                let p = Point::new(0.12, 0.0025 * f64::from(i % 20), 0.0025 * f64::from(i / 20));
+                let p = p + Vector::repeat(0.001) + Vector::x() * (0.002 * (f64::from(view) - 1.0));
+                bins.extend(Bin::of(&p, &axes, 0.05, 1));
+            }
+        }
+        folded(bins, u32::max)
+    }
+
+    #[test]
+    fn a_wall_fills_its_cell_along_itself_and_lies_thin_across() {
+        let bins = wall(3);
+        assert_eq!(bins.len(), 1);
+        assert_eq!(bins[0].index, [2, 0, 0]);
+        let [x, y, z] = bins[0].extent(0.05);
+        assert!((x[0] + x[1] - 0.242).abs() < 1e-9 && x[1] - x[0] < 0.006, "{x:?}");
+        assert!(y[0] < 0.002 && y[1] > 0.048 && z[0] < 0.002 && z[1] > 0.048, "{y:?} {z:?}");
+    }
+
+    #[test]
+    fn the_grid_has_the_rooms_heading_and_stands_upright() {
+        let tilt = crate::math::rotation(&Vector::new(1.0, 2.0, 0.0), 0.03);
+        let turn = crate::math::rotation(&Vector::z(), 0.4);
+        let frame =
+            ManhattanFrame { axes: [Vector::x(), Vector::y(), Vector::z()].map(|a| tilt * turn * a), frames: 1 };
+        let axes = grid_axes(Some(&frame), &Vector::z());
+        assert_eq!(axes[2], Vector::z());
+        assert!(axes[0].dot(&(turn * Vector::x())) > 0.999);
+        assert!((axes[0].cross(&axes[1]) - axes[2]).norm() < 1e-12);
+    }
+}
