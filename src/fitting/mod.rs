@@ -1,5 +1,6 @@
 //! From joints to boxes: the moving part around what was seen to move, its handle, the furniture behind it (ours).
 
+pub mod joints;
 pub mod overlap;
 
 use nalgebra::Matrix3;
