@@ -127,7 +127,9 @@ pub fn check(twin: &Twin) -> Result<()> {
             ));
         }
         if !([joint.observed, joint.expected].iter().all(|x| x.is_finite()) && is_rotation(&f.part.bounds.rotation)) {
-            return fault(format!("{id}: observed and expected opening must be finite, the axes of its bounds a rotation"));
+            return fault(format!(
+                "{id}: observed and expected opening must be finite, the axes of its bounds a rotation"
+            ));
         }
     }
     for s in &twin.room {
@@ -174,7 +176,8 @@ mod tests {
     #[test]
     fn x_is_turned_onto_every_axis() {
         let nearly_back = Vector::new(-1.0, 1e-9, 0.0).normalize();
-        for axis in [Vector::x(), -Vector::x(), Vector::y(), -Vector::z(), nearly_back, Vector::repeat(1.0).normalize()] {
+        for axis in [Vector::x(), -Vector::x(), Vector::y(), -Vector::z(), nearly_back, Vector::repeat(1.0).normalize()]
+        {
             assert!((from_x(&axis) * Vector::x() - axis).norm() < 1e-7, "{axis}");
         }
     }
