@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! recording ─ hands ─ localization ─ geometry ─ reasoning ─ inference ─ fitting ─ export
-//!             §3.1     §3.1, A.3     §3.2, A.4   §3.3, A.6   §3.4, A.7     │        └ URDF, MJCF, glTF
+//!             §3.1     §3.1, A.3     §3.2, A.4   §3.3, A.6   §3.4, A.7     │        └ URDF, MJCF, glTF, USD
 //!             A.2                    A.5                     C.2           └ validation (rapier against the hand)
 //! ```
 //!

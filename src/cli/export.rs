@@ -2,14 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 
 use super::output::write_file;
 use super::{Answer, print, shown};
-use crate::json;
+use crate::config::Config;
+use crate::fitting::joints::{self, JointsFile};
 use crate::validation::Validation;
-use crate::{export, twin::Twin};
+use crate::{export, json, twin::Twin};
 
 /// A file format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -18,18 +19,23 @@ pub enum Format {
     Urdf,
     /// MuJoCo model
     Mjcf,
-    /// Binary glTF 2.0
+    /// Binary glTF 2.0 with animations, for viewers
     Gltf,
+    /// Binary glTF 2.0 with KHR_physics_rigid_bodies, for engines
+    GltfPhysics,
+    /// OpenUSD text with UsdPhysics, for Isaac
+    Usd,
 }
 
 #[derive(Debug, Args)]
 pub struct ExportArgs {
-    /// A twin.json, or the folder that `paws twin` wrote
+    /// A twin.json, the folder that `paws twin` wrote, or joints found elsewhere (docs/joints-format.md)
     twin: PathBuf,
     /// Formats, separated by commas
-    #[arg(long, value_delimiter = ',', default_value = "urdf,mjcf,gltf")]
+    #[arg(long, value_delimiter = ',', default_value = "urdf,mjcf,gltf,gltf-physics,usd")]
     format: Vec<Format>,
-    /// Folder for scene.urdf, scene.xml, kitchen.xml, scene.glb
+    /// Folder for scene.urdf, scene.xml, kitchen.xml, scene.glb, physics.glb, scene.usda; and for twin.json where joints
+    /// were given
     #[arg(long, value_name = "DIR", default_value = ".")]
     out: PathBuf,
 }
@@ -40,16 +46,58 @@ pub fn read_twin(path: &Path) -> anyhow::Result<Twin> {
     Ok(json::read(&file)?)
 }
 
+/// What `paws export` was given.
+enum Given {
+    /// A twin.
+    Twin,
+    /// Joints found elsewhere.
+    Joints,
+}
+
+/// Tells a twin from joints by the keys of the file.
+fn kind_of(path: &Path) -> anyhow::Result<Given> {
+    if path.is_dir() {
+        return Ok(Given::Twin);
+    }
+    let value: serde_json::Value = json::read(path)?;
+    match (value.get("furniture").is_some(), value.get("joints").is_some()) {
+        (true, _) => Ok(Given::Twin),
+        (false, true) => Ok(Given::Joints),
+        (false, false) => bail!(
+            "{}: neither a twin (it has no \"furniture\") nor joints (it has no \"joints\"; see docs/joints-format.md)",
+            shown(path)
+        ),
+    }
+}
+
 pub fn run(args: &ExportArgs) -> anyhow::Result<Answer> {
-    let twin = read_twin(&args.twin)?;
-    // With its verdicts, where they lie beside the twin: the same file as `paws twin` wrote.
-    let beside = match args.twin.is_dir() {
-        true => args.twin.join("validation.json"),
-        false => args.twin.with_file_name("validation.json"),
-    };
-    let verdicts = if beside.is_file() { json::read::<Validation>(&beside)?.words() } else { Vec::new() };
     // Every format is made before the first is written: nothing half-done is left behind.
     let mut files: Vec<(&str, Vec<u8>)> = Vec::new();
+    let given = kind_of(&args.twin)?;
+    // What could not be built of a twin was said when it was made.
+    let made_here = matches!(given, Given::Joints);
+    let (twin, verdicts) = match given {
+        Given::Twin => {
+            // With its verdicts, where they lie beside the twin: the same file as `paws twin` wrote.
+            let beside = match args.twin.is_dir() {
+                true => args.twin.join("validation.json"),
+                false => args.twin.with_file_name("validation.json"),
+            };
+            let verdicts = if beside.is_file() { json::read::<Validation>(&beside)?.words() } else { Vec::new() };
+            (read_twin(&args.twin)?, verdicts)
+        }
+        Given::Joints => {
+            let path = &args.twin;
+            let file: JointsFile = json::read(path)?;
+            let twin = joints::from_joints(&file, &Config::default().fitting).with_context(|| shown(path))?;
+            let target = args.out.join("twin.json");
+            if target.canonicalize().is_ok_and(|t| path.canonicalize().is_ok_and(|p| p == t)) {
+                bail!("{}: would be replaced by the twin made of it; choose another --out", shown(path));
+            }
+            files.push(("twin.json", json::text(&twin)?.into_bytes()));
+            (twin, Vec::new())
+        }
+    };
     for format in &args.format {
         match format {
             Format::Urdf => files.push(("scene.urdf", export::urdf::write(&twin)?.into_bytes())),
@@ -58,6 +106,8 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<Answer> {
                 files.push(("kitchen.xml", export::mjcf::write_model(&twin)?.into_bytes()));
             }
             Format::Gltf => files.push(("scene.glb", export::gltf::write(&twin, &verdicts)?)),
+            Format::GltfPhysics => files.push(("physics.glb", export::gltf::write_physics(&twin)?)),
+            Format::Usd => files.push(("scene.usda", export::usd::write(&twin)?.into_bytes())),
         }
     }
     std::fs::create_dir_all(&args.out).with_context(|| shown(&args.out))?;
@@ -66,5 +116,11 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<Answer> {
         write_file(&path, bytes)?;
         print(&format!("{}\n", shown(&path)))?;
     }
-    Ok(Answer::Yes)
+    if !made_here || twin.left_out.is_empty() {
+        return Ok(Answer::Yes);
+    }
+    for left in &twin.left_out {
+        eprintln!("{}: not built: {}", left.id, left.reason);
+    }
+    Ok(Answer::No)
 }

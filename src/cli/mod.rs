@@ -54,7 +54,7 @@ enum Command {
     Twin(twin::TwinArgs),
     /// Infer joints from recordings, or from a bare trajectory
     Infer(infer::InferArgs),
-    /// Write a twin as URDF, MJCF or glTF
+    /// Write a twin, or joints found elsewhere, as URDF, MJCF, glTF and USD
     Export(export::ExportArgs),
     /// Simulate a twin's joints against its recorded hands
     Validate(validate::ValidateArgs),

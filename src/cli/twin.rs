@@ -39,14 +39,16 @@ pub struct TwinArgs {
     words: WordsArgs,
 }
 
-const FILES: [FileNote; 12] = [
-    FileNote { name: "scene.urdf", what: "the twin for ROS, PyBullet, Drake, Pinocchio, Isaac" },
+const FILES: [FileNote; 14] = [
+    FileNote { name: "scene.urdf", what: "the twin for ROS, PyBullet, Drake, Pinocchio" },
     FileNote { name: "scene.xml", what: "the twin for MuJoCo, with floor, light and keyframes" },
     FileNote {
         name: "kitchen.xml",
         what: "the same without floor and light, to include in a MuJoCo scene of your own",
     },
     FileNote { name: "scene.glb", what: "the twin for viewers and game engines, with an animation per joint" },
+    FileNote { name: "physics.glb", what: "the twin for engines that read KHR_physics_rigid_bodies" },
+    FileNote { name: "scene.usda", what: "the twin for Isaac and OpenUSD, with UsdPhysics" },
     FileNote { name: "index.html", what: "this page" },
     FileNote { name: "articulations.json", what: "every joint and every clip with its evidence" },
     FileNote { name: "predictions.json", what: "one row a clip, for `paws evaluate`" },
@@ -131,6 +133,8 @@ pub fn make(
     output.write("scene.xml", export::mjcf::write(&twin)?)?;
     output.write("kitchen.xml", export::mjcf::write_model(&twin)?)?;
     output.write("scene.glb", &glb)?;
+    output.write("physics.glb", export::gltf::write_physics(&twin)?)?;
+    output.write("scene.usda", export::usd::write(&twin)?)?;
     output.write("articulations.json", files::articulations(&scene, &reasoner)?)?;
     output.write("predictions.json", json::text(&files::predictions(&scene, &twin))?)?;
     output.write("twin.json", json::text(&twin)?)?;
@@ -157,10 +161,11 @@ pub fn make(
         shown(&out.join("index.html"))
     ))?;
     print(&format!(
-        "use:   {}   {}   {}\n",
+        "use:   {}   {}   {}   {}\n",
         shown(&out.join("scene.urdf")),
         shown(&out.join("scene.xml")),
-        shown(&out.join("scene.glb"))
+        shown(&out.join("scene.glb")),
+        shown(&out.join("scene.usda"))
     ))?;
     let refuted = validation.joints.iter().any(|j| j.verdict == Verdict::Fail);
     Ok(if refuted || twin.furniture.is_empty() { Answer::No } else { Answer::Yes })

@@ -1,15 +1,20 @@
-//! Binary glTF: one pivot node per joint at its hinge, boxes below it, an open-and-close animation per joint.
+//! Binary glTF: for viewers with one pivot node per joint at its hinge, boxes below it and an open-and-close animation per
+//! joint; for engines with bodies, colliders and joints.
+//!
+//! Two files, because where a node is animated the animation moves it, not the physics.
 
 use gltf::binary::{Glb, Header};
 use serde_json::{Value, json};
 
-use super::{color, material};
+use super::{ROLES, ROOM, color, from_x, material, principal};
 use crate::articulation::JointKind;
 use crate::error::{Error, Result};
 use crate::math::{Point, rotation};
-use crate::twin::{Role, Solid, Twin};
+use crate::twin::{Part, Solid, Twin, mass_properties};
 
-const ROLES: [Role; 4] = [Role::Front, Role::Handle, Role::Tray, Role::Carcass];
+/// Extensions of the file with physics. Readers that do not know them still show the scene: none is required.
+const RIGID_BODIES: &str = "KHR_physics_rigid_bodies";
+const SHAPES: &str = "KHR_implicit_shapes";
 /// Seconds to open; closing takes as long again.
 const OPEN_SECS: f32 = 1.5;
 /// Rotations are interpolated the short way round: keyframes lie at most this far apart.
@@ -57,100 +62,274 @@ impl Buffer {
     }
 }
 
-/// The twin as GLB. World +Z up becomes glTF's +Y up in the root node.
+/// A file in the making.
+struct Scene {
+    buffer: Buffer,
+    meshes: Vec<Value>,
+    materials: Vec<Value>,
+    nodes: Vec<Value>,
+}
+
+impl Scene {
+    /// Materials, one box mesh a role, and node 0: -90 degrees about x turn +Z up into +Y up.
+    fn new() -> Self {
+        let mut buffer = Buffer::default();
+        let (positions, normals, indices) = unit_cube(&mut buffer);
+        let materials = ROLES
+            .iter()
+            .map(|r| {
+                json!({"name": material(*r), "pbrMetallicRoughness":
+                    {"baseColorFactor": color(*r), "metallicFactor": 0.0, "roughnessFactor": 0.7}})
+            })
+            .collect();
+        let meshes = ROLES
+            .iter()
+            .enumerate()
+            .map(|(i, r)| {
+                json!({"name": format!("box_{}", material(*r)), "primitives": [
+                    {"attributes": {"POSITION": positions, "NORMAL": normals}, "indices": indices, "material": i}]})
+            })
+            .collect();
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let nodes = vec![json!({"name": "scene", "rotation": [-half, 0.0, 0.0, half]})];
+        Self { buffer, meshes, materials, nodes }
+    }
+
+    /// Adds a node; returns its index.
+    fn push(&mut self, node: Value) -> usize {
+        self.nodes.push(node);
+        self.nodes.len() - 1
+    }
+
+    /// The file: `more` are further entries of its root object.
+    fn finish(mut self, name: &str, roots: &[usize], more: Vec<(&str, Value)>) -> Result<Vec<u8>> {
+        if !roots.is_empty() {
+            self.nodes[0]["children"] = json!(roots);
+        }
+        while !self.buffer.bytes.len().is_multiple_of(4) {
+            self.buffer.bytes.push(0);
+        }
+        let mut root = json!({
+            "asset": {"version": "2.0", "generator": concat!("paws ", env!("CARGO_PKG_VERSION"))},
+            "scene": 0,
+            "scenes": [{"name": name, "nodes": [0]}],
+            "nodes": self.nodes, "meshes": self.meshes, "materials": self.materials,
+            "accessors": self.buffer.accessors, "bufferViews": self.buffer.views,
+            "buffers": [{"byteLength": self.buffer.bytes.len()}],
+        });
+        for (key, value) in more {
+            root[key] = value;
+        }
+        let text = serde_json::to_vec(&root).map_err(|e| Error::Export(format!("glTF: {e}")))?;
+        let glb = Glb {
+            header: Header { magic: *b"glTF", version: 2, length: 0 },
+            json: text.into(),
+            bin: Some(self.buffer.bytes.into()),
+        };
+        glb.to_vec().map_err(|e| Error::Export(format!("glTF: {e}")))
+    }
+}
+
+/// The twin as GLB for viewers. World +Z up becomes glTF's +Y up in the root node.
 ///
 /// # Errors
 /// Where the twin cannot be a scene (see [`super::check`]).
 pub fn write(twin: &Twin, verdicts: Verdicts) -> Result<Vec<u8>> {
     super::check(twin)?;
-    let mut buffer = Buffer::default();
-    let (positions, normals, indices) = unit_cube(&mut buffer);
-    let materials: Vec<Value> = ROLES
-        .iter()
-        .map(|r| {
-            json!({"name": material(*r), "pbrMetallicRoughness":
-                {"baseColorFactor": color(*r), "metallicFactor": 0.0, "roughnessFactor": 0.7}})
-        })
-        .collect();
-    let meshes: Vec<Value> = ROLES
-        .iter()
-        .enumerate()
-        .map(|(i, r)| {
-            json!({"name": format!("box_{}", material(*r)), "primitives": [
-                {"attributes": {"POSITION": positions, "NORMAL": normals}, "indices": indices, "material": i}]})
-        })
-        .collect();
-
-    // Node 0 is the root: -90 degrees about x turns +Z up into +Y up.
-    let half = std::f64::consts::FRAC_1_SQRT_2;
-    let mut nodes: Vec<Value> = vec![json!({"name": "scene", "rotation": [-half, 0.0, 0.0, half]})];
+    let mut scene = Scene::new();
     let mut roots = Vec::new();
     let mut animations = Vec::new();
     for f in &twin.furniture {
-        let base = nodes.len();
-        nodes.push(json!({"name": f.name}));
-        let mut children: Vec<usize> = f.carcass.iter().map(|s| push_box(&mut nodes, s, &Point::origin())).collect();
+        let base = scene.push(json!({"name": f.name}));
+        let mut children: Vec<usize> =
+            f.carcass.iter().map(|s| push_box(&mut scene.nodes, s, &Point::origin())).collect();
+        let part = &f.part;
+        let origin = part.joint.articulation.origin;
+        let mut extras = extras(part, twin.density_kg_per_m3);
+        let verdict = verdicts.iter().find(|(id, _)| *id == part.id).map_or("unknown", |(_, v)| v.as_str());
+        extras["joint"]["verdict"] = json!(verdict);
+        let pivot = scene.push(json!({
+            "name": part.id, "translation": array(origin.coords.as_slice()), "extras": extras,
+        }));
+        let mut part_children: Vec<usize> =
+            part.solids.iter().map(|s| push_box(&mut scene.nodes, s, &origin)).collect();
+        part_children.push(scene.push(handle(part)));
+        scene.nodes[pivot]["children"] = json!(part_children);
+        children.push(pivot);
+        scene.nodes[base]["children"] = json!(children);
+        roots.push(base);
+        animations.push(animation(&mut scene.buffer, pivot, part));
+    }
+    if !twin.room.is_empty() {
+        let room = scene.push(json!({"name": ROOM}));
+        let children: Vec<usize> = twin.room.iter().map(|s| push_box(&mut scene.nodes, s, &Point::origin())).collect();
+        scene.nodes[room]["children"] = json!(children);
+        roots.push(room);
+    }
+    let more = if animations.is_empty() { Vec::new() } else { vec![("animations", json!(animations))] };
+    scene.finish(&twin.name, &roots, more)
+}
+
+/// The twin as GLB for engines, with `KHR_physics_rigid_bodies` and `KHR_implicit_shapes`: each part is a body with mass
+/// and inertia, each box a collider, each joint two frames with limits in radians or metres and a damper; carcasses and
+/// the room collide and do not move. There is no animation in it, and no dry friction: the extension has none.
+///
+/// # Errors
+/// Where the twin cannot be a scene (see [`super::check`]).
+pub fn write_physics(twin: &Twin) -> Result<Vec<u8>> {
+    super::check(twin)?;
+    let mut scene = Scene::new();
+    let (mut shapes, mut joints, mut roots) = (Vec::new(), Vec::new(), Vec::new());
+    for f in &twin.furniture {
         let part = &f.part;
         let phi = part.joint.articulation;
-        let pivot = nodes.len();
-        let verdict = verdicts.iter().find(|(id, _)| *id == part.id).map_or("unknown", |(_, v)| v.as_str());
-        nodes.push(json!({
-            "name": part.id,
-            "translation": array(phi.origin.coords.as_slice()),
-            "extras": {"joint": {
-                "id": part.id, "label": part.label, "kind": phi.kind, "axis": phi.axis.as_slice(),
-                "lower": 0.0, "upper": part.joint.upper, "observed": part.joint.observed, "verdict": verdict,
-                "damping": part.joint.damping, "friction": part.joint.friction,
-            }},
+        let origin = array(phi.origin.coords.as_slice());
+        let q = from_x(&phi.axis);
+        let turn = array(&[q.i, q.j, q.k, q.w]);
+        let base = scene.push(json!({"name": f.name}));
+        let mut children = colliders(&mut scene, &mut shapes, &f.carcass, &Point::origin());
+
+        let mut inside = colliders(&mut scene, &mut shapes, &part.solids, &phi.origin);
+        inside.push(scene.push(handle(part)));
+        // Frames are relative to the body they are in; closed, both of a joint are in the same place.
+        let frame = scene.push(json!({"name": format!("{}_frame", part.id), "rotation": turn}));
+        inside.push(frame);
+        let body = scene.push(json!({
+            "name": format!("{}_link", part.id), "translation": origin, "children": inside,
+            "extensions": {RIGID_BODIES: {"motion": motion(part, twin.density_kg_per_m3)}},
         }));
-        let mut part_children: Vec<usize> = part.solids.iter().map(|s| push_box(&mut nodes, s, &phi.origin)).collect();
-        part_children.push(nodes.len());
-        nodes.push(
-            json!({"name": format!("{}_handle", part.id), "translation": array((part.handle - phi.origin).as_slice())}),
-        );
-        nodes[pivot]["children"] = json!(part_children);
-        children.push(pivot);
-        nodes[base]["children"] = json!(children);
+        children.push(body);
+        // The joint is the base's node: an opening is where the part is, seen from there.
+        let joint = scene.push(json!({
+            "name": part.id, "translation": origin, "rotation": turn,
+            "extensions": {RIGID_BODIES: {"joint":
+                {"connectedNode": frame, "joint": joints.len(), "enableCollision": false}}},
+            "extras": extras(part, twin.density_kg_per_m3),
+        }));
+        children.push(joint);
+        joints.push(limits(part));
+        scene.nodes[base]["children"] = json!(children);
         roots.push(base);
-        animations.push(animation(&mut buffer, pivot, part));
     }
-    if !roots.is_empty() {
-        nodes[0]["children"] = json!(roots);
+    if !twin.room.is_empty() {
+        let children = colliders(&mut scene, &mut shapes, &twin.room, &Point::origin());
+        roots.push(scene.push(json!({"name": ROOM, "children": children})));
     }
-    while !buffer.bytes.len().is_multiple_of(4) {
-        buffer.bytes.push(0);
+    let mut extensions = json!({});
+    let mut used = Vec::new();
+    if !shapes.is_empty() {
+        extensions[SHAPES] = json!({"shapes": shapes});
+        used.extend([SHAPES, RIGID_BODIES]);
     }
-    let mut root = json!({
-        "asset": {"version": "2.0", "generator": concat!("paws ", env!("CARGO_PKG_VERSION"))},
-        "scene": 0,
-        "scenes": [{"name": twin.name, "nodes": [0]}],
-        "nodes": nodes, "meshes": meshes, "materials": materials,
-        "accessors": buffer.accessors, "bufferViews": buffer.views,
-        "buffers": [{"byteLength": buffer.bytes.len()}],
-    });
-    if !animations.is_empty() {
-        root["animations"] = json!(animations);
+    if !joints.is_empty() {
+        extensions[RIGID_BODIES] = json!({"physicsJoints": joints});
     }
-    let text = serde_json::to_vec(&root).map_err(|e| Error::Export(format!("glTF: {e}")))?;
-    let glb = Glb {
-        header: Header { magic: *b"glTF", version: 2, length: 0 },
-        json: text.into(),
-        bin: Some(buffer.bytes.into()),
-    };
-    glb.to_vec().map_err(|e| Error::Export(format!("glTF: {e}")))
+    let more =
+        if used.is_empty() { Vec::new() } else { vec![("extensionsUsed", json!(used)), ("extensions", extensions)] };
+    scene.finish(&twin.name, &roots, more)
+}
+
+/// What a joint's node says to those who read no extension: rad, m, N, kg.
+fn extras(part: &Part, density: f64) -> Value {
+    let (joint, phi) = (&part.joint, part.joint.articulation);
+    json!({"joint": {
+        "id": part.id, "label": part.label, "kind": phi.kind, "axis": phi.axis.as_slice(),
+        "lower": 0.0, "upper": joint.upper, "observed": joint.observed, "expected": joint.expected,
+        "damping": joint.damping, "friction": joint.friction, "resistance_seen": joint.resistance_seen,
+        "balanced": joint.balanced, "effort": joint.effort(), "velocity": joint.velocity(),
+        "mass": mass_properties(&part.solids, density).map(|m| m.mass),
+    }})
+}
+
+fn handle(part: &Part) -> Value {
+    let local = part.handle - part.joint.articulation.origin;
+    json!({"name": format!("{}_handle", part.id), "translation": array(local.as_slice())})
+}
+
+/// A part's mass and inertia in the frame of its node.
+fn motion(part: &Part, density: f64) -> Value {
+    let mut motion = json!({});
+    if let Some(m) = mass_properties(&part.solids, density) {
+        let (moments, axes) = principal(&m.inertia);
+        let q = axes.quaternion();
+        motion = json!({
+            "mass": single(m.mass),
+            "centerOfMass": array((m.center - part.joint.articulation.origin).as_slice()),
+            "inertiaDiagonal": array(moments.as_slice()),
+            "inertiaOrientation": array(&[q.i, q.j, q.k, q.w]),
+        });
+    }
+    if part.joint.balanced {
+        motion["gravityFactor"] = json!(0.0);
+    }
+    motion
+}
+
+/// A joint's limits and damper about or along the X axis of its frames.
+fn limits(part: &Part) -> Value {
+    let joint = &part.joint;
+    let upper = single(joint.upper);
+    let drive = |kind: &str| json!([{"type": kind, "mode": "force", "axis": 0, "velocityTarget": 0.0, "damping": single(joint.damping)}]);
+    match joint.articulation.kind {
+        JointKind::Revolute => json!({
+            "limits": [
+                {"linearAxes": [0, 1, 2], "min": 0.0, "max": 0.0},
+                {"angularAxes": [1, 2], "min": 0.0, "max": 0.0},
+                {"angularAxes": [0], "min": 0.0, "max": upper},
+            ],
+            "drives": drive("angular"),
+        }),
+        JointKind::Prismatic => json!({
+            "limits": [
+                {"linearAxes": [1, 2], "min": 0.0, "max": 0.0},
+                {"angularAxes": [0, 1, 2], "min": 0.0, "max": 0.0},
+                {"linearAxes": [0], "min": 0.0, "max": upper},
+            ],
+            "drives": drive("linear"),
+        }),
+    }
+}
+
+/// Boxes as colliders, each with its picture below it: a collider's node is not scaled. Returns the colliders' nodes.
+fn colliders(scene: &mut Scene, shapes: &mut Vec<Value>, solids: &[Solid], origin: &Point) -> Vec<usize> {
+    let mut nodes = Vec::with_capacity(solids.len());
+    for s in solids {
+        let pose = super::local_pose(&s.shape, origin);
+        let q = pose.rotation.quaternion();
+        let size = array((s.shape.half * 2.0).as_slice());
+        let picture = scene.push(json!({"name": format!("{}_visual", s.name), "mesh": mesh(s), "scale": size}));
+        nodes.push(scene.push(json!({
+            "name": s.name,
+            "translation": array(pose.translation.vector.as_slice()),
+            "rotation": array(&[q.i, q.j, q.k, q.w]),
+            "children": [picture],
+            "extensions": {RIGID_BODIES: {"collider": {"geometry": {"shape": shapes.len()}}}},
+            "extras": {"role": s.role, "seen": s.seen},
+        })));
+        shapes.push(json!({"type": "box", "box": {"size": size}}));
+    }
+    nodes
+}
+
+/// The mesh of a box: one a role.
+fn mesh(solid: &Solid) -> usize {
+    ROLES.iter().position(|r| *r == solid.role).unwrap_or(0)
+}
+
+fn single(value: f64) -> f64 {
+    // glTF numbers are single precision; the nearest one is written, not 17 digits that a reader rounds anyway.
+    f64::from(value as f32)
 }
 
 fn array(values: &[f64]) -> Vec<f64> {
-    // glTF numbers are single precision; the nearest one is written, not 17 digits that a reader rounds anyway.
-    values.iter().map(|v| f64::from(*v as f32)).collect()
+    values.iter().map(|v| single(*v)).collect()
 }
 
 fn push_box(nodes: &mut Vec<Value>, solid: &Solid, origin: &Point) -> usize {
     let pose = super::local_pose(&solid.shape, origin);
     let q = pose.rotation.quaternion();
-    let mesh = ROLES.iter().position(|r| *r == solid.role).unwrap_or(0);
     nodes.push(json!({
-        "name": solid.name, "mesh": mesh,
+        "name": solid.name, "mesh": mesh(solid),
         "translation": array(pose.translation.vector.as_slice()),
         "rotation": array(&[q.i, q.j, q.k, q.w]),
         "scale": array((solid.shape.half * 2.0).as_slice()),
@@ -189,7 +368,7 @@ fn unit_cube(buffer: &mut Buffer) -> (usize, usize, usize) {
 }
 
 /// Closed, open, closed.
-fn animation(buffer: &mut Buffer, node: usize, part: &crate::twin::Part) -> Value {
+fn animation(buffer: &mut Buffer, node: usize, part: &Part) -> Value {
     let phi = part.joint.articulation;
     let steps = match phi.kind {
         JointKind::Revolute => (part.joint.upper / MAX_STEP_RAD).ceil().max(1.0) as usize,

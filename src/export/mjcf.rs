@@ -4,11 +4,11 @@ use std::io::Cursor;
 
 use quick_xml::Writer;
 
-use super::{color, local_pose, material};
+use super::{ROLES, ROOM, color, local_pose, material};
 use crate::articulation::JointKind;
 use crate::error::{Error, Result};
 use crate::math::Point;
-use crate::twin::{Role, Solid, Twin, mass_properties};
+use crate::twin::{Solid, Twin, mass_properties};
 
 type Xml = Writer<Cursor<Vec<u8>>>;
 
@@ -18,6 +18,8 @@ fn list(values: &[f64]) -> String {
 
 /// The body that holds all furniture: a scene can move the kitchen as one, and Pinocchio reads one root body only.
 pub(crate) const ROOT: &str = "kitchen";
+/// What the names of the room's boxes begin with that people stand on.
+const ROOM_FLOOR: &str = "room_floor";
 
 /// The twin as a scene: the furniture with floor and light, and keyframes `closed` and `open`.
 ///
@@ -56,7 +58,7 @@ fn model(xml: &mut Xml, twin: &Twin, with_room: bool) -> std::io::Result<()> {
         }
         defaults(xml)?;
         xml.create_element("asset").write_inner_content(|xml| {
-            for role in [Role::Front, Role::Handle, Role::Tray, Role::Carcass] {
+            for role in ROLES {
                 xml.create_element("material")
                     .with_attributes([("name", material(role)), ("rgba", list(&color(role)).as_str())])
                     .write_empty()?;
@@ -76,6 +78,12 @@ fn model(xml: &mut Xml, twin: &Twin, with_room: bool) -> std::io::Result<()> {
                             part(xml, twin, f)
                         },
                     )?;
+                }
+                if !twin.room.is_empty() {
+                    xml.create_element("body").with_attribute(("name", ROOM)).write_inner_content(|xml| {
+                        inertial(xml, &twin.room, &Point::origin(), twin.density_kg_per_m3)?;
+                        geoms(xml, &twin.room, &Point::origin())
+                    })?;
                 }
                 Ok(())
             })?;
@@ -147,8 +155,13 @@ fn floor_and_light(xml: &mut Xml, twin: &Twin) -> std::io::Result<()> {
     let low = corners.iter().map(|c| c.z).fold(f64::INFINITY, f64::min);
     let high = corners.iter().map(|c| c.z).fold(f64::NEG_INFINITY, f64::max);
     let middle = crate::math::centroid(&corners).unwrap_or(Point::origin());
-    // The recording does not tell the floor: just under the lowest point.
-    let floor = if low.is_finite() { low - 0.01 } else { 0.0 };
+    // On the room's floor; where the recording does not tell it, just under the lowest point.
+    let of_room = twin.room.iter().filter(|s| s.name.starts_with(ROOM_FLOOR)).flat_map(|s| s.shape.corners());
+    let floor = match of_room.map(|c| c.z).max_by(f64::total_cmp) {
+        Some(top) => top,
+        None if low.is_finite() => low - 0.01,
+        None => 0.0,
+    };
     let top = if high.is_finite() { high + 2.0 } else { 3.0 };
     xml.create_element("light")
         .with_attributes([("pos", list(&[middle.x, middle.y, top]).as_str()), ("dir", "0 0 -1")])
@@ -168,31 +181,40 @@ fn floor_and_light(xml: &mut Xml, twin: &Twin) -> std::io::Result<()> {
 fn part(xml: &mut Xml, twin: &Twin, f: &crate::twin::Furniture) -> std::io::Result<()> {
     let part = &f.part;
     let phi = part.joint.articulation;
-    xml.create_element("body")
-        .with_attributes([("name", body_name(&part.id).as_str()), ("pos", list(phi.origin.coords.as_slice()).as_str())])
-        .write_inner_content(|xml| {
-            inertial(xml, &part.solids, &phi.origin, twin.density_kg_per_m3)?;
-            xml.create_element("joint")
-                .with_attributes([
-                    ("name", part.id.as_str()),
-                    ("class", if phi.kind == JointKind::Revolute { "hinge" } else { "slide" }),
-                    ("axis", list(phi.axis.as_slice()).as_str()),
-                    ("range", list(&[0.0, part.joint.upper]).as_str()),
-                    ("damping", part.joint.damping.to_string().as_str()),
-                    ("frictionloss", part.joint.friction.to_string().as_str()),
-                ])
-                .write_empty()?;
-            geoms(xml, &part.solids, &phi.origin)?;
-            xml.create_element("site")
-                .with_attributes([
-                    ("name", format!("{}_handle", part.id).as_str()),
-                    ("pos", list((part.handle - phi.origin).as_slice()).as_str()),
-                    ("size", "0.01"),
-                    ("group", "4"),
-                ])
-                .write_empty()?;
-            Ok(())
-        })?;
+    let mut body = xml.create_element("body").with_attributes([
+        ("name", body_name(&part.id).as_str()),
+        ("pos", list(phi.origin.coords.as_slice()).as_str()),
+    ]);
+    if part.joint.balanced {
+        // A spring carries its weight over the whole range.
+        body = body.with_attribute(("gravcomp", "1"));
+    }
+    // Out of the face is the site's z, up its y.
+    let out = part.bounds.orientation();
+    body.write_inner_content(|xml| {
+        inertial(xml, &part.solids, &phi.origin, twin.density_kg_per_m3)?;
+        xml.create_element("joint")
+            .with_attributes([
+                ("name", part.id.as_str()),
+                ("class", if phi.kind == JointKind::Revolute { "hinge" } else { "slide" }),
+                ("axis", list(phi.axis.as_slice()).as_str()),
+                ("range", list(&[0.0, part.joint.upper]).as_str()),
+                ("damping", part.joint.damping.to_string().as_str()),
+                ("frictionloss", part.joint.friction.to_string().as_str()),
+            ])
+            .write_empty()?;
+        geoms(xml, &part.solids, &phi.origin)?;
+        xml.create_element("site")
+            .with_attributes([
+                ("name", format!("{}_handle", part.id).as_str()),
+                ("pos", list((part.handle - phi.origin).as_slice()).as_str()),
+                ("quat", list(&[out.w, out.i, out.j, out.k]).as_str()),
+                ("size", "0.01"),
+                ("group", "4"),
+            ])
+            .write_empty()?;
+        Ok(())
+    })?;
     Ok(())
 }
 

@@ -1,15 +1,24 @@
-//! A twin as URDF, MJCF and glTF: `&Twin -> bytes`, no IO, no recording.
+//! A twin as URDF, MJCF, glTF and USD: `&Twin -> bytes`, no IO, no recording.
 //!
-//! All formats share one set of frames: a part's link sits at its joint's origin with the world's axes, a base at the
-//! world's origin. Boxes keep their own orientation.
+//! All formats share one set of frames: a part's link sits at its joint's origin with the world's axes, a base and the
+//! room at the world's origin. Boxes keep their own orientation.
 
 pub mod gltf;
 pub mod mjcf;
 pub mod urdf;
+pub mod usd;
+
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
 use crate::error::{Error, Result};
-use crate::math::{Point, Pose};
-use crate::twin::{OrientedBox, Role, Twin};
+use crate::math::{Point, Pose, Vector, eigen_descending};
+use crate::twin::{OrientedBox, Role, Solid, Twin};
+
+/// Every role, in the order of the materials.
+pub(crate) const ROLES: [Role; 5] = [Role::Front, Role::Handle, Role::Tray, Role::Carcass, Role::Room];
+
+/// The body that holds the room's boxes, where there are any.
+pub(crate) const ROOM: &str = "room";
 
 /// RGBA of a role.
 pub(crate) fn color(role: Role) -> [f64; 4] {
@@ -38,14 +47,29 @@ pub(crate) fn local_pose(shape: &OrientedBox, origin: &Point) -> Pose {
     Pose::from_parts((shape.center - origin).into(), shape.orientation())
 }
 
-/// Refuses what no simulator loads: names that repeat or have other characters than `[A-Za-z0-9_]`, sizes and masses
-/// that are not positive, limits that no part has, anything farther away than a home is wide.
+/// Rotation that turns +X onto a unit axis: for formats whose joints turn about or slide along an axis of their frame.
+pub(crate) fn from_x(axis: &Vector) -> UnitQuaternion<f64> {
+    // Straight back, every half turn about a direction square to X does.
+    UnitQuaternion::rotation_between(&Vector::x(), axis)
+        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector::z_axis(), std::f64::consts::PI))
+}
+
+/// Principal moments of an inertia (kg m^2, largest first), and the rotation from the principal axes to its own.
+pub(crate) fn principal(inertia: &Matrix3<f64>) -> (Vector, UnitQuaternion<f64>) {
+    let (mut axes, moments) = eigen_descending(*inertia);
+    if axes.determinant() < 0.0 {
+        let last = -axes.column(2).into_owned();
+        axes.set_column(2, &last);
+    }
+    (moments, UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes)))
+}
+
+/// Refuses what no simulator loads: names that repeat, begin with a digit or have other characters than `[A-Za-z0-9_]`,
+/// sizes and masses that are not positive, limits that no part has, anything farther away than a home is wide.
 ///
 /// # Errors
 /// Naming the part and what is wrong with it.
 pub fn check(twin: &Twin) -> Result<()> {
-    // A home is smaller, and single precision still tells millimetres there.
-    const FAR_M: f64 = 1e3;
     let fault = |text: String| Err(Error::Export(text));
     if !(twin.density_kg_per_m3.is_finite() && twin.density_kg_per_m3 > 0.0) {
         return fault(format!("density {} must be positive", twin.density_kg_per_m3));
@@ -55,30 +79,34 @@ pub fn check(twin: &Twin) -> Result<()> {
     }
     // Names that the formats add must not be taken either.
     let mut names: std::collections::BTreeSet<String> =
-        ["world", "floor", "scene", mjcf::ROOT].map(str::to_owned).into();
+        ["world", "floor", "scene", mjcf::ROOT, ROOM, "room_fixed", usd::MATERIALS].map(str::to_owned).into();
+    let mut take = |name: String| {
+        if !is_name(&name) {
+            return Err(Error::Export(format!(
+                "name \"{name}\": only letters, digits and _, the first no digit, are safe in all formats"
+            )));
+        }
+        match names.replace(name) {
+            Some(name) => Err(Error::Export(format!("name \"{name}\" is used twice"))),
+            None => Ok(()),
+        }
+    };
     for f in &twin.furniture {
         let id = &f.part.id;
-        let derived = [format!("{}_fixed", f.name), format!("{id}_link"), format!("{id}_handle")];
-        let solids = || f.carcass.iter().chain(&f.part.solids);
-        let own = [&f.name, id].into_iter().chain(solids().map(|s| &s.name)).cloned();
-        for name in own.chain(derived).chain(solids().map(|s| format!("{}_visual", s.name))) {
-            if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
-                return fault(format!("name \"{name}\": only letters, digits and _ are safe in all formats"));
-            }
-            if let Some(name) = names.replace(name) {
-                return fault(format!("name \"{name}\" is used twice"));
-            }
+        let derived = [
+            format!("{}_fixed", f.name),
+            format!("{id}_link"),
+            format!("{id}_handle"),
+            format!("{id}_frame"),
+            format!("{id}_furniture"),
+        ];
+        for name in [&f.name, id].into_iter().cloned().chain(derived) {
+            take(name)?;
         }
-        for s in solids() {
-            let b = &s.shape;
-            let sizes = b.half.iter().all(|h| *h > 0.0 && *h < FAR_M);
-            let orthonormal = (b.rotation.transpose() * b.rotation - nalgebra::Matrix3::identity()).norm() < 1e-6;
-            if !(sizes && orthonormal && b.rotation.determinant() > 0.0 && near(&b.center, FAR_M)) {
-                return fault(format!(
-                    "box {}: sizes must be positive, axes right-handed and orthonormal, all within {FAR_M} m",
-                    s.name
-                ));
-            }
+        for s in f.carcass.iter().chain(&f.part.solids) {
+            take(s.name.clone())?;
+            take(format!("{}_visual", s.name))?;
+            check_box(s)?;
         }
         if f.part.solids.is_empty() || f.carcass.is_empty() {
             return fault(format!("{id}: a part and its base need at least one box each"));
@@ -98,10 +126,70 @@ pub fn check(twin: &Twin) -> Result<()> {
                  not negative, origin and handle within {FAR_M} m"
             ));
         }
+        if !([joint.observed, joint.expected].iter().all(|x| x.is_finite()) && is_rotation(&f.part.bounds.rotation)) {
+            return fault(format!(
+                "{id}: observed and expected opening must be finite, the axes of its bounds a rotation"
+            ));
+        }
+    }
+    for s in &twin.room {
+        take(s.name.clone())?;
+        take(format!("{}_visual", s.name))?;
+        check_box(s)?;
     }
     Ok(())
 }
 
+/// A home is smaller, and single precision still tells millimetres there.
+const FAR_M: f64 = 1e3;
+
+/// Whether a name is one in all formats: USD's are identifiers.
+fn is_name(name: &str) -> bool {
+    name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+        && name.chars().next().is_some_and(|c| !c.is_ascii_digit())
+}
+
+fn check_box(s: &Solid) -> Result<()> {
+    let b = &s.shape;
+    let sizes = b.half.iter().all(|h| *h > 0.0 && *h < FAR_M);
+    if sizes && is_rotation(&b.rotation) && near(&b.center, FAR_M) {
+        return Ok(());
+    }
+    Err(Error::Export(format!(
+        "box {}: sizes must be positive, axes right-handed and orthonormal, all within {FAR_M} m",
+        s.name
+    )))
+}
+
+fn is_rotation(m: &Matrix3<f64>) -> bool {
+    (m.transpose() * m - Matrix3::identity()).norm() < 1e-6 && m.determinant() > 0.0
+}
+
 fn near(p: &Point, limit: f64) -> bool {
     p.coords.iter().all(|c| c.abs() < limit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn x_is_turned_onto_every_axis() {
+        let nearly_back = Vector::new(-1.0, 1e-9, 0.0).normalize();
+        for axis in [Vector::x(), -Vector::x(), Vector::y(), -Vector::z(), nearly_back, Vector::repeat(1.0).normalize()]
+        {
+            assert!((from_x(&axis) * Vector::x() - axis).norm() < 1e-7, "{axis}");
+        }
+    }
+
+    #[test]
+    fn principal_axes_and_moments_make_the_inertia_again() {
+        let turn = Rotation3::from_euler_angles(0.3, -0.8, 2.0);
+        for moments in [Vector::new(0.1, 0.5, 0.55), Vector::new(0.2, 0.2, 0.3), Vector::repeat(0.4)] {
+            let inertia = turn.matrix() * Matrix3::from_diagonal(&moments) * turn.matrix().transpose();
+            let (found, axes) = principal(&inertia);
+            let axes = *axes.to_rotation_matrix().matrix();
+            assert!((axes * Matrix3::from_diagonal(&found) * axes.transpose() - inertia).norm() < 1e-12);
+        }
+    }
 }

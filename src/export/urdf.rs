@@ -1,17 +1,23 @@
 //! URDF through `urdf-rs`.
 
+use std::io::Cursor;
+
+use quick_xml::events::Event;
+use quick_xml::{Reader, Writer};
 use urdf_rs::{
     Axis, Collision, Color, Dynamics, Geometry, Inertia, Inertial, Joint, JointLimit, JointType, Link, LinkName, Mass,
     Material, Pose, Robot, Vec3, Vec4, Visual,
 };
 
-use super::{color, local_pose, material};
+use super::{ROLES, ROOM, color, local_pose, material};
 use crate::articulation::JointKind;
 use crate::error::{Error, Result};
 use crate::math::Point;
-use crate::twin::{MassProperties, Role, Solid, Twin, mass_properties};
+use crate::twin::{MassProperties, Solid, Twin, mass_properties};
 
-/// The twin as URDF text: a `world` link, every base fixed to it, one joint per part, one box per board.
+/// The twin as URDF text: a `world` link, every base and the room fixed to it, one joint per part, one box per board.
+///
+/// URDF cannot say that a spring carries a part: where one does, gravity pulls at it here all the same.
 ///
 /// # Errors
 /// Where the twin cannot be a simulator's model (see [`super::check`]).
@@ -23,19 +29,7 @@ pub fn write(twin: &Twin) -> Result<String> {
         let origin = Point::origin();
         let density = twin.density_kg_per_m3;
         links.push(link(&f.name, &f.carcass, &origin, mass_properties(&f.carcass, density)));
-        joints.push(Joint {
-            name: format!("{}_fixed", f.name),
-            joint_type: JointType::Fixed,
-            origin: Pose::default(),
-            parent: LinkName { link: "world".to_owned() },
-            child: LinkName { link: f.name.clone() },
-            axis: Axis::default(),
-            limit: JointLimit::default(),
-            calibration: None,
-            dynamics: None,
-            mimic: None,
-            safety_controller: None,
-        });
+        joints.push(fixed(&f.name));
         let part = &f.part;
         let phi = part.joint.articulation;
         let link_name = format!("{}_link", part.id);
@@ -62,12 +56,34 @@ pub fn write(twin: &Twin) -> Result<String> {
             safety_controller: None,
         });
     }
-    let materials = [Role::Front, Role::Handle, Role::Tray, Role::Carcass]
+    if !twin.room.is_empty() {
+        let mass = mass_properties(&twin.room, twin.density_kg_per_m3);
+        links.push(link(ROOM, &twin.room, &Point::origin(), mass));
+        joints.push(fixed(ROOM));
+    }
+    let materials = ROLES
         .map(|r| Material { name: material(r).to_owned(), color: Some(Color { rgba: Vec4(color(r)) }), texture: None })
         .to_vec();
     let robot = Robot { name: robot_name(&twin.name), links, joints, materials };
     let text = urdf_rs::write_to_string(&robot).map_err(|e| Error::Export(format!("URDF: {e}")))?;
-    Ok(finish(&text))
+    finish(&text).map_err(|e| Error::Export(format!("URDF: {e}")))
+}
+
+/// The joint that holds a link to the world.
+fn fixed(name: &str) -> Joint {
+    Joint {
+        name: format!("{name}_fixed"),
+        joint_type: JointType::Fixed,
+        origin: Pose::default(),
+        parent: LinkName { link: "world".to_owned() },
+        child: LinkName { link: name.to_owned() },
+        axis: Axis::default(),
+        limit: JointLimit::default(),
+        calibration: None,
+        dynamics: None,
+        mimic: None,
+        safety_controller: None,
+    }
 }
 
 /// Robot names end up as identifiers in ROS.
@@ -76,27 +92,62 @@ fn robot_name(name: &str) -> String {
     if clean.is_empty() { "twin".to_owned() } else { clean }
 }
 
-/// What the writer of `urdf-rs` cannot say: no inertial for `world` (it writes a zero mass), and the element that keeps
-/// MuJoCo from fusing the fixed furniture into the world and dropping the visuals.
-fn finish(text: &str) -> String {
-    let mut out = String::with_capacity(text.len() + 256);
-    let mut rest = text;
-    if let (Some(start), Some(end)) = (text.find("<inertial>"), text.find("</inertial>"))
-        && text.find("<link name=\"world\">").is_some_and(|w| w < start)
-    {
-        let from = text[..start].rfind('>').map_or(start, |i| i + 1);
-        out.push_str(&text[..from]);
-        rest = &text[end + "</inertial>".len()..];
+/// What the writer of `urdf-rs` cannot say: no inertial for `world` (it writes a zero mass), no limits for fixed joints
+/// (it writes zeros), and the element that keeps MuJoCo from fusing the fixed furniture into the world and dropping the
+/// visuals.
+fn finish(text: &str) -> std::result::Result<String, Box<dyn std::error::Error>> {
+    let mut reader = Reader::from_str(text);
+    reader.config_mut().trim_text(true);
+    let mut writer = Writer::new_with_indent(Cursor::new(Vec::new()), b' ', 2);
+    // In the link `world`; in a fixed joint; how deep in an element that is left out.
+    let (mut world, mut fixed, mut skipped) = (false, false, 0usize);
+    loop {
+        let event = reader.read_event()?;
+        match &event {
+            Event::Eof => break,
+            Event::Start(e) | Event::Empty(e) => {
+                let name = e.name();
+                let value = |key: &str| -> std::result::Result<Option<String>, Box<dyn std::error::Error>> {
+                    Ok(e.try_get_attribute(key)?.map(|a| a.value.to_string()))
+                };
+                match name.as_ref() {
+                    "link" => world = value("name")?.as_deref() == Some("world"),
+                    "joint" => fixed = value("type")?.as_deref() == Some("fixed"),
+                    _ => {}
+                }
+                let left_out = (world && name.as_ref() == "inertial") || (fixed && name.as_ref() == "limit");
+                if skipped > 0 || left_out {
+                    skipped += usize::from(matches!(event, Event::Start(_)));
+                    continue;
+                }
+            }
+            Event::End(e) => {
+                match e.name().as_ref() {
+                    "link" => world = false,
+                    "joint" => fixed = false,
+                    _ => {}
+                }
+                if skipped > 0 {
+                    skipped -= 1;
+                    continue;
+                }
+            }
+            _ => {}
+        }
+        let root = matches!(&event, Event::Start(e) if e.name().as_ref() == "robot");
+        writer.write_event(event)?;
+        if root {
+            writer.create_element("mujoco").write_inner_content(|xml| {
+                xml.create_element("compiler")
+                    .with_attributes([("fusestatic", "false"), ("discardvisual", "false")])
+                    .write_empty()?;
+                Ok(())
+            })?;
+        }
     }
-    out.push_str(rest);
-    let mujoco = "<mujoco>\n    <compiler fusestatic=\"false\" discardvisual=\"false\"/>\n  </mujoco>";
-    if let Some(at) = out.find("<robot").and_then(|r| out[r..].find('>').map(|i| r + i + 1)) {
-        out.insert_str(at, &format!("\n  {mujoco}"));
-    }
-    if !out.ends_with('\n') {
-        out.push('\n');
-    }
-    out
+    let mut out = String::from_utf8(writer.into_inner().into_inner())?;
+    out.push('\n');
+    Ok(out)
 }
 
 fn link(name: &str, solids: &[Solid], origin: &Point, mass: Option<MassProperties>) -> Link {
@@ -133,5 +184,22 @@ fn link(name: &str, solids: &[Solid], origin: &Point, mass: Option<MassPropertie
             .iter()
             .map(|s| Collision { name: Some(s.name.clone()), origin: pose(s), geometry: geometry(s) })
             .collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_worlds_inertial_and_the_limits_of_fixed_joints_go() {
+        let text = r#"<robot name="a"><link name="world"><inertial><mass value="0"/></inertial></link>
+            <link name="b"><inertial><mass value="2"/></inertial></link>
+            <joint name="c" type="fixed"><limit lower="0"/><axis xyz="1 0 0"/></joint>
+            <joint name="d" type="revolute"><limit lower="0"/></joint></robot>"#;
+        let done = finish(text).unwrap();
+        assert!(!done.contains("<mass value=\"0\"/>") && done.contains("<mass value=\"2\"/>"), "{done}");
+        assert_eq!((done.matches("<limit").count(), done.matches("<axis").count()), (1, 1), "{done}");
+        assert!(done.contains("<compiler fusestatic=\"false\" discardvisual=\"false\"/>"), "{done}");
     }
 }

@@ -1,6 +1,7 @@
 //! From joints to boxes: the moving part around what was seen to move, its handle, the furniture behind it, how far it opens
 //! and what it resists with, and the room around it (ours).
 
+pub mod joints;
 mod limits;
 pub mod overlap;
 mod resistance;

@@ -48,6 +48,7 @@ for (const file of files) {
     required: json.extensionsRequired ?? [],
     used: json.extensionsUsed ?? [],
     names: json.nodes.map((n) => n.name),
+    raw: { nodes: json.nodes, extensions: json.extensions ?? {} },
     nodes,
     animations,
   };

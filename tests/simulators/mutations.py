@@ -42,6 +42,11 @@ MUTATIONS = (
     ("fronts 5 mm too deep", "MJCF", "fronts", "deep", 11, "MuJoCo"),
     ("handle elsewhere", "MJCF", r'(_handle" pos=")[^ ]*', r"\g<1>9", 9, "Drake"),
     ("no handle", "MJCF", r'<site name="([^"]*)_handle"', r'<site name="\1_grip"', 5, "the text"),
+    ("radians", "USD", r"(physics:upperLimit = )[\d.]+", r"\g<1>1.92", 15, "usd-core"),
+    ("frames apart", "USD", r"(physics:localPos1 = \()0", r"\g<1>0.1", 8, "usd-core"),
+    ("axis token elsewhere", "USD", r'physics:axis = "X"', 'physics:axis = "Z"', 9, "usd-core"),
+    ("no articulation", "USD", r"PhysicsArticulationRootAPI", "PhysicsFilteredPairsAPI", 8, "usd-core"),
+    ("mass in grams", "USD", r"(physics:mass = [\d.]+)", r"\g<1>e3", 3, "usd-core"),
     ("not +Y up", "glTF", rb'"rotation":\[-0.70710\d*,0.0,0.0,', b'"rotation":[0.0,0.0,0.0,', 7, "three.js"),
 )
 

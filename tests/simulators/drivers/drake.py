@@ -37,6 +37,7 @@ class Drake(Posed, Engine):
         "does not currently support non-zero joint friction": "friction is for the engines that have it",
         "tag '(light|site|keyframe|visual)' found .* unsupported": "of no effect on the physics",
         "attribute '(integrator|frictionloss)' .* unsupported": "Drake has its own integrator and no joint friction",
+        "attribute 'gravcomp' .* unsupported": "it has no springs that carry a part",
         "half spaces are not currently supported for deformable contact": "nothing here is deformable",
     }
 

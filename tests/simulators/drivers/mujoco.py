@@ -66,7 +66,7 @@ class MuJoCo(Posed, Engine):
     def own(self):
         boxes = self.model.geom_type == mujoco.mjtGeom.mjGEOM_BOX
         visual = boxes & (self.model.geom_contype == 0) & (self.model.geom_conaffinity == 0)
-        wanted = sum(len(s) for s in self.twin.solids.values())
+        wanted = self.twin.boxes
         if visual.sum() != wanted or (boxes & ~visual).sum() != wanted:
             yield f"{visual.sum()} visual and {(boxes & ~visual).sum()} colliding boxes, the twin has {wanted}"
 
@@ -114,7 +114,7 @@ class Urdf(MuJoCo):
 
 
 class Mjcf(MuJoCo):
-    format = "MJCF"
+    format, springs = "MJCF", True
     cannot = Urdf.cannot
 
 

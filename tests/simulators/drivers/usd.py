@@ -1,4 +1,4 @@
-"""USD: our own scene.usda where there is one, else what urdf-usd-converter (in its own environment) makes of the URDF.
+"""USD: our own scene.usda, and what urdf-usd-converter (in its own environment) makes of the URDF.
 
 OpenUSD's validators pass radians in a field of degrees, crooked joint frames and missing masses: those are read here.
 """
@@ -13,14 +13,14 @@ import numpy as np
 from definition import Body, Limits, Reader, Unanswered, all_but, off
 from pxr import Usd, UsdGeom, UsdPhysics, UsdValidation
 
-from .text import FILES
+from .text import FILES, SAFE, rewritten
 
 CONVERT = "import sys, urdf_usd_converter; urdf_usd_converter.Converter().convert(*sys.argv[1:])"
 
 
 def missing(folder):
     """Why it cannot run; `folder` is the converter's environment."""
-    UsdCore.converter = folder / "bin/python" if folder and (folder / "bin/python").exists() else None
+    Converted.converter = folder / "bin/python" if folder and (folder / "bin/python").exists() else None
     return None
 
 
@@ -33,20 +33,23 @@ def array(quaternion):
     return np.eye(3) + 2 * w * cross + 2 * cross @ cross
 
 
-class UsdCore(Reader):
-    format, simulator = "USD", "usd-core"
+def finite(value):
+    """None where a value is left open."""
+    return None if value is None or not math.isfinite(value) else value
+
+
+class Stage(Reader):
+    """A USD file through usd-core."""
+
+    format = "USD"
     version = importlib.metadata.version("usd-core")
-    converter = None
     # Positions and degrees are single precision.
     exact = 1e-5
-    cannot = all_but({1, 2, 3, 4, 8, 9, 15}, "a file format, nothing runs")
 
     def __init__(self, twin):
         self.twin = twin
-        own = twin.folder / FILES["USD"]
         with tempfile.TemporaryDirectory() as folder:
-            path = own if own.exists() else self.converted(twin, folder)
-            self.stage = Usd.Stage.Open(str(path))
+            self.stage = Usd.Stage.Open(str(self.path(folder)))
             self.stage.Load()
             self.found = UsdValidation.ValidationContext(
                 UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
@@ -55,17 +58,6 @@ class UsdCore(Reader):
         self.links = {p.GetName(): p for p in self.stage.Traverse() if p.HasAPI(UsdPhysics.RigidBodyAPI)}
         self.poses = UsdGeom.XformCache()
         self.warnings = "\n".join(str(e.GetMessage()) for e in self.found)
-
-    def converted(self, twin, folder):
-        if self.converter is None:
-            raise Unanswered("no scene.usda, and no urdf-usd-converter to make one")
-        result = subprocess.run(
-            [self.converter, "-c", CONVERT, twin.folder / FILES["URDF"], folder], capture_output=True, text=True
-        )
-        made = list(pathlib.Path(folder).glob("*.usda"))
-        if result.returncode or len(made) != 1:
-            raise RuntimeError(f"urdf-usd-converter: {result.stderr.strip()[-200:]}")
-        return made[0]
 
     def pose(self, prim):
         """(rotation, position) in the world, closed."""
@@ -106,7 +98,7 @@ class UsdCore(Reader):
                 self.axis(joint),
                 None if damping is None else damping / unit,
                 value(joint, "newton:friction"),
-                value(joint, "urdf:limit:effort", f"{drive}:maxForce"),
+                finite(value(joint, "urdf:limit:effort", f"{drive}:maxForce")),
                 None if speed is None else speed * unit,
             )
         return read
@@ -123,17 +115,18 @@ class UsdCore(Reader):
             )
         return read
 
+    def handle(self, part):
+        """Where the file has the handle of a closed part."""
+        return part.handle
+
     def handles(self, share):
         at = {}
         for p in self.twin.parts:
-            (_, origin), axis, q = (
-                next(iter(self.frames(self.joints[p.name]))),
-                self.axis(self.joints[p.name]),
-                share * p.upper,
-            )
-            r = p.handle - origin
+            (_, origin), axis = next(iter(self.frames(self.joints[p.name]))), self.axis(self.joints[p.name])
+            q, handle = share * p.upper, self.handle(p)
+            r = handle - origin
             turned = r * math.cos(q) + np.cross(axis, r) * math.sin(q) + axis * (axis @ r) * (1 - math.cos(q))
-            at[p.name] = origin + turned if p.turns else p.handle + axis * q
+            at[p.name] = origin + turned if p.turns else handle + axis * q
         return at
 
     def structure(self):
@@ -171,4 +164,85 @@ class UsdCore(Reader):
                 yield f"{p.name}: the joint's frames are {off(at_a, at_b):.2g} m and {off(turn_a, turn_b):.2g} apart"
 
 
-READERS = [UsdCore]
+class UsdCore(Stage):
+    """Our own file."""
+
+    simulator, springs = "usd-core", True
+    cannot = all_but({1, 2, 3, 4, 5, 8, 9, 15, 17}, "a file format, nothing runs")
+
+    def path(self, _):
+        return self.twin.folder / FILES["USD"]
+
+    def handle(self, part):
+        return self.pose(self.links[part.link].GetChild(f"{part.name}_handle"))[1]
+
+    def names(self):
+        boxes = [p for p in self.stage.Traverse() if p.HasAPI(UsdPhysics.CollisionAPI)]
+        yield from (f'name "{p.GetName()}"' for p in self.stage.Traverse() if not SAFE.fullmatch(p.GetName()))
+        if len(boxes) != self.twin.boxes or not all(b.IsA(UsdGeom.Cube) for b in boxes):
+            yield f"{len(boxes)} colliders, the twin has {self.twin.boxes} boxes"
+        for b in boxes:
+            # One of side 1 is taken for one of side 2 by some readers.
+            if UsdGeom.Cube(b).GetSizeAttr().Get() != 2:
+                yield f"{b.GetName()}: a cube of another side than 2"
+        for p in self.twin.parts:
+            if not self.links[p.link].GetChild(f"{p.name}_handle"):
+                yield f"{p.link}: no prim {p.name}_handle"
+
+    def repeated(self, twin):
+        return rewritten(twin, self.format)
+
+    def own(self):
+        yield from super().own()
+        parsed = {
+            kind: dict(zip((str(path) for path in paths), descriptions))
+            for kind, (paths, descriptions) in UsdPhysics.LoadUsdPhysicsFromRange(self.stage, ["/"]).items()
+        }
+        kinds = UsdPhysics.ObjectType
+        yield from (f"{path}: not valid" for found in parsed.values() for path, d in found.items() if not d.isValid)
+        # The fixed joint is the root: the engine sees a base that cannot move.
+        articulations = parsed.get(kinds.Articulation, {}).values()
+        roots = sorted(path.name for a in articulations for path in a.rootPrims)
+        if roots != sorted(f"{p.base}_fixed" for p in self.twin.parts):
+            yield f"articulations have their roots at {roots}"
+        if any(len([b for b in a.articulatedBodies if b]) != 2 for a in articulations):
+            yield "an articulation of more or less than a base and its part"
+        for p in self.twin.parts:
+            prim = self.joints[p.name]
+            joint = parsed.get(kinds.RevoluteJoint if p.turns else kinds.PrismaticJoint, {}).get(str(prim.GetPath()))
+            if joint is None:
+                yield f"{p.name}: not a {p.kind} joint"
+                continue
+            unit = math.pi / 180 if p.turns else 1.0
+            if not joint.limit.enabled or off(joint.limit.upper * unit, p.upper) > 1e-5:
+                yield f"{p.name}: opens by {joint.limit.upper}, the model by {p.upper / unit}"
+            if joint.collisionEnabled:
+                yield f"{p.name}: its bodies collide"
+            gravity = self.links[p.link].GetAttribute("physxRigidBody:disableGravity")
+            if bool(gravity and gravity.Get()) != p.balanced:
+                yield f"{p.link}: gravity pulls where a spring carries, or does not where none does"
+        fixed = [s for s in parsed.get(kinds.CubeShape, {}).values() if not s.rigidBody]
+        if len(fixed) != len(self.twin.room):
+            yield f"{len(fixed)} boxes without a body, the room has {len(self.twin.room)}"
+
+
+class Converted(Stage):
+    """What urdf-usd-converter makes of our URDF: a check of the URDF more than of the USD."""
+
+    simulator = "converted URDF"
+    converter = None
+    cannot = all_but({1, 2, 3, 4, 8, 9, 15}, "a file format, nothing runs")
+
+    def path(self, folder):
+        if self.converter is None:
+            raise Unanswered("no urdf-usd-converter")
+        result = subprocess.run(
+            [self.converter, "-c", CONVERT, self.twin.folder / FILES["URDF"], folder], capture_output=True, text=True
+        )
+        made = list(pathlib.Path(folder).glob("*.usda"))
+        if result.returncode or len(made) != 1:
+            raise RuntimeError(f"urdf-usd-converter: {result.stderr.strip()[-200:]}")
+        return made[0]
+
+
+READERS = [UsdCore, Converted]
