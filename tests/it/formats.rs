@@ -364,7 +364,9 @@ fn masses_are_density_times_volume_and_inertias_are_possible() {
 /// A twin with a floor and a wall, and a spring on its first part.
 fn furnished() -> Twin {
     let mut twin = sample();
-    twin.furniture[0].part.joint.balanced = true;
+    for (i, piece) in twin.furniture.iter_mut().enumerate() {
+        piece.part.joint.balanced = i == 0;
+    }
     let solid = |name: &str, center: Point, half: Vector| Solid {
         name: name.to_owned(),
         role: Role::Room,
