@@ -73,53 +73,75 @@ fn beside_any_joint(path: &[Point]) -> f64 {
     line.min(arc).max(0.0).sqrt()
 }
 
-/// The grip on the closed part that suits a whole path best: errors of the closed end alone would move the entire motion.
-/// On a hinge the distance and the height are those of the path, the angle is that of `closed`.
-#[must_use]
-pub fn anchored(joint: &Articulation, closed: &Point, path: &[Point]) -> Point {
+/// The grip on the closed part that suits a whole path best (errors of the closed end alone would move the entire motion),
+/// and the path's mean squared distance from where opening takes it, m^2. No opening is below closed. On a hinge the grip's
+/// distance and height are those of the path, its angle is that of `closed`.
+fn fitted(joint: &Articulation, closed: &Point, path: &[Point]) -> (Point, f64) {
     let count = path.len().max(1) as f64;
-    let along = clamped(joint, closed, path);
-    match joint.kind {
-        JointKind::Prismatic => {
-            let offset = path.iter().zip(&along).fold(Vector::zeros(), |sum, (p, opening)| {
-                sum + reject(&(p - joint.motion(*opening) * closed), &joint.axis)
-            });
-            closed + offset / count
+    let arm = reject(&(closed - joint.origin), &joint.axis);
+    match (joint.kind, unit(&arm)) {
+        (JointKind::Prismatic, _) => {
+            // Side steps from the line through `closed`, and squares of what lies before it.
+            let steps: Vec<(Vector, f64)> = path
+                .iter()
+                .map(|p| {
+                    let d = p - closed;
+                    (reject(&d, &joint.axis), d.dot(&joint.axis).min(0.0).powi(2))
+                })
+                .collect();
+            let mean = steps.iter().fold(Vector::zeros(), |sum, (side, _)| sum + side) / count;
+            let sum: f64 = steps.iter().map(|(side, before)| (side - mean).norm_squared() + before).sum();
+            (closed + mean, sum / count)
         }
-        JointKind::Revolute => {
-            let Some(arm) = unit(&reject(&(closed - joint.origin), &joint.axis)) else { return *closed };
-            let (mut radius, mut height) = (0.0, 0.0);
-            for (p, opening) in path.iter().zip(&along) {
-                let d = p - joint.origin;
-                let turned = crate::math::rotation(&joint.axis, *opening) * arm;
-                radius += d.dot(&turned) / count;
-                height += d.dot(&joint.axis) / count;
-            }
-            joint.origin + arm * radius.max(0.0) + joint.axis * height
+        (JointKind::Revolute, Some(arm)) => {
+            let side = joint.axis.cross(&arm);
+            let mut last = 0.0;
+            // Distance from the hinge (of what lies before the closed end: along the closed arm), height, and the square of
+            // what lies beside the closed arm.
+            let places: Vec<[f64; 3]> = path
+                .iter()
+                .map(|p| {
+                    let d = p - joint.origin;
+                    let (x, y) = (d.dot(&arm), d.dot(&side));
+                    let turn = std::f64::consts::TAU;
+                    let angle = y.atan2(x);
+                    last = angle - ((angle - last) / turn).round() * turn;
+                    let (distance, beside) = if last >= 0.0 { (x.hypot(y), 0.0) } else { (x, y * y) };
+                    [distance, d.dot(&joint.axis), beside]
+                })
+                .collect();
+            let mean = |k: usize| places.iter().map(|p| p[k]).sum::<f64>() / count;
+            let (radius, height) = (mean(0).max(0.0), mean(1));
+            let sum: f64 =
+                places.iter().map(|[r, h, beside]| (r - radius).powi(2) + (h - height).powi(2) + beside).sum();
+            (joint.origin + arm * radius + joint.axis * height, sum / count)
         }
+        // A hand on the hinge itself is held there.
+        (JointKind::Revolute, None) => (*closed, path_distance2(joint, closed, path)),
     }
 }
 
-/// Openings along a path, none below closed.
-fn clamped(joint: &Articulation, grip: &Point, path: &[Point]) -> Vec<f64> {
-    openings(joint, grip, path).into_iter().map(|q| q.max(0.0)).collect()
-}
-
-/// Mean squared distance of a path from what the part's point `grip` (when closed) can reach by opening, m^2.
+/// The grip on the closed part that suits a clip best, world.
 #[must_use]
-pub fn path_distance2(joint: &Articulation, grip: &Point, path: &[Point]) -> f64 {
-    let sum: f64 = path
-        .iter()
-        .zip(clamped(joint, grip, path))
-        .map(|(p, opening)| (p - joint.motion(opening) * grip).norm_squared())
-        .sum();
-    sum / path.len().max(1) as f64
+pub fn anchored(joint: &Articulation, clip: &Evidence) -> Point {
+    fitted(joint, &clip.closed, &clip.path).0
 }
 
 /// Mean squared distance of a clip's hand from the path that a joint would force on it, m^2.
 #[must_use]
 pub fn distance2(joint: &Articulation, clip: &Evidence) -> f64 {
-    path_distance2(joint, &anchored(joint, &clip.closed, &clip.path), &clip.path)
+    fitted(joint, &clip.closed, &clip.path).1
+}
+
+/// Mean squared distance of a path from where opening takes the part's point `grip`, m^2.
+#[must_use]
+pub fn path_distance2(joint: &Articulation, grip: &Point, path: &[Point]) -> f64 {
+    let sum: f64 = path
+        .iter()
+        .zip(openings(joint, grip, path))
+        .map(|(p, opening)| (p - joint.motion(opening.max(0.0)) * grip).norm_squared())
+        .sum();
+    sum / path.len().max(1) as f64
 }
 
 /// How likely a joint makes the hands of all clips, in nats up to a constant. Heavy-tailed: beyond the expected noise only
@@ -133,7 +155,7 @@ pub fn log_likelihood(joint: &Articulation, clips: &[Evidence], config: &config:
 /// What else a joint could be.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Rival {
-    /// In words: "left hinge", "slide straight out", ...
+    /// In words: "hinge on the left", "slide straight out", ...
     pub name: String,
     /// The joint.
     pub articulation: Articulation,
@@ -154,8 +176,8 @@ pub fn rivals(part: &Part, grip: &Point, config: &config::Validation) -> Vec<Riv
     let front = part.solids.iter().find(|s| s.role == Role::Front).map_or(bounds.center, |s| s.shape.center);
     let depth = out * out.dot(&(front - bounds.center));
     for (axis, across, half, names) in [
-        (up, right, bounds.half.x, ["left hinge", "right hinge"]),
-        (right, up, bounds.half.y, ["lower hinge", "upper hinge"]),
+        (up, right, bounds.half.x, ["hinge on the left", "hinge on the right"]),
+        (right, up, bounds.half.y, ["hinge below", "hinge above"]),
     ] {
         for (name, sign) in names.into_iter().zip([-1.0, 1.0]) {
             let origin = bounds.center + depth + across * (half * sign);
@@ -280,7 +302,12 @@ mod tests {
         for (joint, range) in [(HINGE, 1.2), (slide, 0.3)] {
             let clip = evidence(&joint, range);
             assert!(distance2(&joint, &clip) < 1e-20);
-            assert!((anchored(&joint, &clip.closed, &clip.path) - clip.closed).norm() < 1e-9);
+            // The other way to the same number.
+            for other in [joint.reversed(), slide, HINGE] {
+                let there = path_distance2(&other, &anchored(&other, &clip), &clip.path);
+                assert!((there - distance2(&other, &clip)).abs() < 1e-12, "{other:?}");
+            }
+            assert!((anchored(&joint, &clip) - clip.closed).norm() < 1e-9);
             // All that a reversed joint can do is stay closed.
             let middle = clip.path[15] - clip.closed;
             assert!(distance2(&joint.reversed(), &clip).sqrt() > 0.4 * middle.norm());

@@ -42,7 +42,7 @@ impl Verdict {
 /// A rival against the joint, over all clips.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RivalCheck {
-    /// What it is: "left hinge", "slide straight out", ...
+    /// What it is: "hinge on the left", "slide straight out", ...
     pub name: String,
     /// The rival joint.
     pub articulation: Articulation,
@@ -142,7 +142,7 @@ pub fn validate(twin: &Twin, hands: &[Hands], up: &Vector, config: &config::Vali
         .enumerate()
         .map(|(i, furniture)| {
             let around = Surroundings::of(twin, i, up);
-            check_joint(furniture, hands.get(i).map_or(&[], Vec::as_slice), &around, config)
+            check_joint(furniture, hands.get(i).map(Vec::as_slice).unwrap_or_default(), &around, config)
         })
         .collect::<Result<_>>()?;
     Ok(Validation { joints })
@@ -180,7 +180,7 @@ fn check_joint(
         .zip(&clips)
         .enumerate()
         .map(|(i, (&(name, action), clip))| {
-            let grip = anchored(&own, &clip.closed, &clip.path);
+            let grip = anchored(&own, clip);
             let drive = Drive { times_secs: clip.times_secs.clone(), path: clip.path.clone(), grip, back: true };
             let rival = match compared.first() {
                 Some(best) => Some(replay_rival(part, best, clip, around, config)?),
@@ -217,7 +217,7 @@ fn replay_rival(
     let drive = Drive {
         times_secs: clip.times_secs.clone(),
         path: clip.path.clone(),
-        grip: anchored(&joint, &clip.closed, &clip.path),
+        grip: anchored(&joint, clip),
         back: false,
     };
     let alone = Surroundings::none(around.up, around.density);
@@ -240,7 +240,7 @@ fn pooled_distance(joint: &Articulation, clips: &[Evidence]) -> f64 {
 /// How far clip `i` is from the joint's path through where the other clips held the handle.
 fn held_out(joint: &Articulation, clips: &[Evidence], i: usize) -> Option<f64> {
     let grips: Vec<Point> =
-        clips.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, c)| anchored(joint, &c.closed, &c.path)).collect();
+        clips.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, c)| anchored(joint, c)).collect();
     let clip = clips.get(i)?;
     centroid(&grips).map(|grip| path_distance2(joint, &grip, &clip.path).sqrt())
 }
@@ -251,8 +251,8 @@ fn held_out(joint: &Articulation, clips: &[Evidence], i: usize) -> Option<f64> {
 /// - *A rival refutes it*: the best rival makes the hands of all clips more likely by `margin_nats` and by what the best of
 ///   so many rivals gains by chance (the logarithm of their number), and is itself not refuted: within twice `pass_rms_m`.
 /// - *It is blocked*: on some clip the part goes through less than `pass_range_share` of the observed range, and what lacks
-///   at the handle is more than grip and noise make up (twice the slack, two standard deviations of the hand at each end).
-///   What it ran into is named.
+///   at the handle is more than grip and noise make up: the slack at both ends, and two standard deviations of the difference
+///   of two positions of the hand. What it ran into is named.
 /// - *It cannot follow*: on more than half of the clips the tracking error is above twice `pass_rms_m` and above twice the
 ///   noise that is left when any hinge or slide may explain the hand. Where none does, the hand is to blame.
 ///
@@ -396,7 +396,7 @@ fn sees(kind: JointKind, resolution: &Resolution) -> String {
     }
 }
 
-/// How likely a rival is beside the joint: "one 20th", "less than one millionth".
+/// How likely a rival is beside the joint: "1/20", "less than a millionth".
 fn one_in(nats: f64) -> String {
     // Beyond this the hands' own model is in doubt, not the rival.
     const MOST: f64 = 1e6;
