@@ -7,7 +7,7 @@ use crate::articulation::JointKind;
 use crate::inference::openings;
 use crate::math::{Point, Vector, any_orthogonal, reject, unit};
 use crate::twin::{Furniture, OrientedBox, Part, Role};
-use crate::validation::{ClipCheck, JointCheck, Replay, Verdict};
+use crate::validation::{ClipCheck, JointCheck, Verdict};
 
 /// Size of the picture, px.
 const SIZE: [f64; 2] = [900.0, 420.0];
@@ -286,14 +286,6 @@ impl Plot {
 
 /// What the lines are.
 fn legend(svg: &mut String, check: &JointCheck, clip: &ClipCheck) {
-    let y = SIZE[1] - 14.0;
-    let mut x = 14.0;
-    let mut entry = |svg: &mut String, style: &str, words: &str| {
-        let _ = writeln!(svg, "<path d=\"M{} {} h24\" fill=\"none\" {style}/>", px(x), px(y - 4.0));
-        text(svg, [x + 30.0, y], "start", "#374151", words);
-        // A character of this size is about 6.3 px wide.
-        x += 30.0 + 6.3 * words.chars().count() as f64 + 22.0;
-    };
     let others = check.clips.len() - 1;
     let more = if others > 0 { format!(" (and {others} more, grey)") } else { String::new() };
     // Names of clips may be long.
@@ -301,18 +293,25 @@ fn legend(svg: &mut String, check: &JointCheck, clip: &ClipCheck) {
         Some((end, _)) => format!("{}…", &clip.clip[..end]),
         None => clip.clip.clone(),
     };
+    let off = |rms_m: f64| format!("off by {}", words::centimetres(rms_m));
     let dotted = format!("stroke=\"{HAND}\" stroke-width=\"4.4\" stroke-linecap=\"round\" stroke-dasharray=\"0.1 8\"");
-    entry(svg, &dotted, &format!("recorded hand, {name}{more}"));
     let solid = format!("stroke=\"{PART}\" stroke-width=\"2.6\"");
-    entry(svg, &solid, &format!("this joint, {}", error_words(&clip.replay)));
+    let mut entries = vec![
+        (dotted, format!("recorded hand, {name}{more}")),
+        (solid, format!("this joint, {}", off(clip.replay.rms_m))),
+    ];
     if let Some(rival) = &clip.rival {
         let dashed = format!("stroke=\"{RIVAL}\" stroke-width=\"2\" stroke-dasharray=\"7 4\"");
-        entry(svg, &dashed, &format!("{}, off by {}", rival.name, words::centimetres(rival.rms_m)));
+        entries.push((dashed, format!("{}, {}", rival.name, off(rival.rms_m))));
     }
-}
-
-fn error_words(replay: &Replay) -> String {
-    format!("off by {}", words::centimetres(replay.rms_m))
+    let y = SIZE[1] - 14.0;
+    let mut x = 14.0;
+    for (style, entry) in entries {
+        let _ = writeln!(svg, "<path d=\"M{} {} h24\" fill=\"none\" {style}/>", px(x), px(y - 4.0));
+        text(svg, [x + 30.0, y], "start", "#374151", &entry);
+        // A character of this size is about 6.3 px wide.
+        x += 30.0 + 6.3 * entry.chars().count() as f64 + 20.0;
+    }
 }
 
 /// 1, 2 or 5 times a power of ten, not below `x`.

@@ -22,8 +22,6 @@ pub struct Evidence {
     pub path: Vec<Point>,
     /// The hand at the closed end of the motion, world.
     pub closed: Point,
-    /// The hand at the open end of the motion, world.
-    pub open: Point,
     /// How many independent samples the path is worth.
     pub samples: f64,
     /// Noise of the hand: what is left of its path beside the best hinge or slide of all, or what the smoother took away,
@@ -49,7 +47,6 @@ impl Evidence {
         Some(Self {
             times_secs: trajectory.samples.iter().map(|s| s.time_secs - first.time_secs).collect(),
             closed: trajectory.closed_grip(),
-            open: trajectory.open_grip(),
             samples,
             noise_m: smoothed_away.max(beside_any_joint(&path)),
             path,
@@ -289,7 +286,6 @@ mod tests {
         Evidence {
             times_secs: (0..=30).map(|i| 0.1 * f64::from(i)).collect(),
             closed: path[0],
-            open: path[30],
             samples: 8.0,
             noise_m: 0.0,
             path,
