@@ -280,17 +280,24 @@ block! {
         hand_stiffness_n_per_m: f64 = 800.0, "N/m", "ours";
         /// The most a person's arm pulls.
         hand_force_max_n: f64 = 150.0, "N", "ours";
+        /// Fingers move on the handle by this much before they pull.
+        grip_slack_m: f64 = 0.01, "m", "ours";
         /// Tracking error up to which a motion counts as explained: a right joint shows 2 to 5 cm of it under the errors
-        /// of estimated hands. Up to twice as much decides nothing, more refutes the joint.
+        /// of estimated hands. More decides nothing; twice as much refutes the joint where the hand itself is steadier.
         pass_rms_m: f64 = 0.05, "m", "ours";
         /// Share of the observed range that the simulated joint must reach.
         pass_range_share: f64 = 0.8, "share", "ours";
-        /// Rivals must be worse by this factor, or the recording cannot decide.
-        rival_margin: f64 = 1.15, "-", "ours";
-        /// Less opening than this cannot tell a hinge from a slide.
-        min_turn_deg: f64 = 15.0, "deg", "ours";
-        /// Less travel than this cannot tell a slide from a hinge.
-        min_travel_m: f64 = 0.08, "m", "ours";
+        /// A joint must be this much more likely than its best rival, in nats over all clips: 3 is twenty to one. A rival
+        /// that is as much more likely than the joint, and than chance among the rivals gives, refutes it.
+        margin_nats: f64 = 3.0, "nats", "ours";
+        /// Independent samples in one recorded motion, at most.
+        effective_samples: f64 = 8.0, "-", "ours";
+        /// Errors of the hand within this time are one error.
+        hand_correlation_secs: f64 = 0.3, "s", "ours";
+        /// Noise of a smoothed hand position when two explanations of it are compared.
+        hand_std_m: f64 = 0.03, "m", "ours";
+        /// A hinge this far beside the right one is a wrong one: rivals stand there on all four sides.
+        rival_shift_m: f64 = 0.25, "m", "ours";
     }
 }
 
@@ -408,6 +415,7 @@ impl Config {
                 "hands.widen_secs",
                 "localization.min_visible_share",
                 "reasoning.vlm_temperature",
+                "validation.grip_slack_m",
             ];
             if !value.is_finite() || value < 0.0 || (value == 0.0 && !zero_is_fine.contains(&row.key.as_str())) {
                 return Err(format!("{} = {} must be a positive finite number ({})", row.key, row.value, row.unit));

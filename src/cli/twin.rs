@@ -17,7 +17,7 @@ use crate::pipeline::{self, Scene};
 use crate::recording::Recording;
 use crate::report::page::FileNote;
 use crate::report::table::aligned;
-use crate::report::{files, page, words};
+use crate::report::{files, page, pictures, words};
 use crate::twin::Twin;
 use crate::validation::{self, Validation, Verdict, verdict::Hands};
 use crate::{export, fitting};
@@ -39,7 +39,7 @@ pub struct TwinArgs {
     words: WordsArgs,
 }
 
-const FILES: [FileNote; 14] = [
+const FILES: [FileNote; 15] = [
     FileNote { name: "scene.urdf", what: "the twin for ROS, PyBullet, Drake, Pinocchio" },
     FileNote { name: "scene.xml", what: "the twin for MuJoCo, with floor, light and keyframes" },
     FileNote {
@@ -53,7 +53,8 @@ const FILES: [FileNote; 14] = [
     FileNote { name: "articulations.json", what: "every joint and every clip with its evidence" },
     FileNote { name: "predictions.json", what: "one row a clip, for `paws evaluate`" },
     FileNote { name: "twin.json", what: "boxes, joints and masses: the model behind all formats" },
-    FileNote { name: "validation.json", what: "every replay: errors, forces, ranges, rivals" },
+    FileNote { name: "validation.json", what: "every replay: errors, forces, contacts, ranges, rivals, the margin" },
+    FileNote { name: "proof/", what: "the pictures of this page, one a joint" },
     FileNote { name: "trajectories.json", what: "the recorded hands that belong to each joint" },
     FileNote { name: "config.toml", what: "the parameters that were used" },
     FileNote { name: "steps/", what: "intermediate results, with --keep" },
@@ -139,6 +140,9 @@ pub fn make(
     output.write("predictions.json", json::text(&files::predictions(&scene, &twin))?)?;
     output.write("twin.json", json::text(&twin)?)?;
     output.write("validation.json", json::text(&validation)?)?;
+    for (furniture, check) in twin.furniture.iter().zip(&validation.joints) {
+        output.write(&format!("proof/{}.svg", file_name(&check.id)), pictures::proof(furniture, check))?;
+    }
     output.write("trajectories.json", json::text(&hands)?)?;
     output.write("config.toml", config.to_toml())?;
     let command = format!("paws twin {} --out {}", recording.name, shown(out));
@@ -171,9 +175,15 @@ pub fn make(
     Ok(if refuted || twin.furniture.is_empty() { Answer::No } else { Answer::Yes })
 }
 
+/// A joint's name as that of a file: joints of models from elsewhere may be called anything.
+fn file_name(id: &str) -> String {
+    id.chars().map(|c| if c.is_alphanumeric() || c == '_' || c == '-' { c } else { '_' }).collect()
+}
+
 /// The table that a person reads.
 pub fn summary(scene: &Scene, twin: &Twin, validation: &Validation) -> String {
-    let header = ["joint", "furniture", "type", "axis", "range", "clips", "tracking error", "peak force", "verdict"];
+    let header =
+        ["joint", "furniture", "type", "axis", "range", "clips", "tracking error", "peak force", "margin", "verdict"];
     let mut rows = vec![header.map(str::to_owned).to_vec()];
     let mut reasons = String::new();
     for (f, check) in twin.furniture.iter().zip(&validation.joints) {
@@ -188,6 +198,7 @@ pub fn summary(scene: &Scene, twin: &Twin, validation: &Validation) -> String {
             joint.map_or(0, |j| j.clips.len()).to_string(),
             words::centimetres(check.rms_m),
             format!("{:.0} N", check.peak_force_n),
+            words::margin(check.margin_nats),
             check.verdict.word().to_owned(),
         ]);
         if check.verdict != Verdict::Pass {

@@ -44,26 +44,41 @@ pub fn run(args: &ValidateArgs) -> anyhow::Result<Answer> {
         })
         .collect();
     let report = validation::validate(&twin, &as_hands(&in_order), &Vector::z(), &config.validation)?;
-    let header =
-        ["joint", "clip", "action", "tracking error", "largest", "peak force", "reached", "observed", "best rival"];
+    let header = [
+        "joint",
+        "clip",
+        "action",
+        "tracking error",
+        "largest",
+        "other clips",
+        "peak force",
+        "reached",
+        "observed",
+        "deepest",
+        "best rival",
+    ];
     let mut rows = vec![header.map(str::to_owned).to_vec()];
     let mut verdicts = String::new();
     for (check, f) in report.joints.iter().zip(&twin.furniture) {
         let kind = f.part.joint.articulation.kind;
         for c in &check.clips {
+            let replay = &c.replay;
             rows.push(vec![
                 check.id.clone(),
                 c.clip.clone(),
                 format!("{:?}", c.action).to_lowercase(),
-                words::centimetres(c.replay.rms_m),
-                words::centimetres(c.replay.max_m),
-                format!("{:.0} N", c.replay.peak_force_n),
-                words::amount(kind, c.replay.reached[1] - c.replay.reached[0]),
+                words::centimetres(replay.rms_m),
+                words::centimetres(replay.max_m),
+                c.held_out_rms_m.map_or("-".to_owned(), words::centimetres),
+                format!("{:.0} N", replay.peak_force_n),
+                words::amount(kind, replay.reached[1] - replay.reached[0]),
                 words::amount(kind, c.observed_range),
-                c.rivals.first().map_or("-".to_owned(), |r| format!("{} {}", r.name, words::centimetres(r.rms_m))),
+                replay.worst_penetration().map_or("-".to_owned(), |(m, with)| format!("{:.1} mm {with}", 1000.0 * m)),
+                c.rival.as_ref().map_or("-".to_owned(), |r| format!("{} {}", r.name, words::centimetres(r.rms_m))),
             ]);
         }
-        verdicts += &format!("{}: {}, {}\n", check.id, check.verdict.word(), check.reason);
+        let margin = words::margin(check.margin_nats);
+        verdicts += &format!("{}: {} ({margin}), {}\n", check.id, check.verdict.word(), check.reason);
     }
     print(&aligned(&rows))?;
     print(&format!("\n{verdicts}"))?;

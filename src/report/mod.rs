@@ -1,7 +1,8 @@
-//! What a person reads: tables, files of results, the page.
+//! What a person reads: tables, files of results, pictures, the page.
 
 pub mod accuracy;
 pub mod files;
 pub mod page;
+pub mod pictures;
 pub mod table;
 pub mod words;

@@ -4,7 +4,7 @@ use base64::Engine;
 use minijinja::Environment;
 use serde::Serialize;
 
-use super::words;
+use super::{pictures, words};
 use crate::error::{Error, Result};
 use crate::pipeline::Scene;
 use crate::twin::Twin;
@@ -35,6 +35,8 @@ struct JointRow {
     verdict: &'static str,
     reason: String,
     clips: String,
+    /// SVG.
+    picture: String,
 }
 
 #[derive(Serialize)]
@@ -78,6 +80,7 @@ pub fn render(
                 verdict: check.verdict.word(),
                 reason: check.reason.clone(),
                 clips: joint.map_or(String::new(), |j| j.clips.join(", ")),
+                picture: pictures::proof(f, check),
             }
         })
         .collect();

@@ -20,6 +20,20 @@ pub fn centimetres(metres: f64) -> String {
     if metres.abs() < 0.1 { format!("{:.1} cm", 100.0 * metres) } else { format!("{:.0} cm", 100.0 * metres) }
 }
 
+/// How much more likely a joint is than its best rival, for people: "20:1"; "1:20" where the rival is.
+#[must_use]
+pub fn margin(nats: Option<f64>) -> String {
+    // Beyond this the hand's noise is in doubt, not the rival.
+    const MOST: f64 = 1e4;
+    let Some(nats) = nats else { return "-".to_owned() };
+    let odds = match nats.abs().exp() {
+        odds if odds > MOST => format!("over {MOST:.0}"),
+        odds if odds < 10.0 => format!("{odds:.1}"),
+        odds => format!("{odds:.0}"),
+    };
+    if nats >= 0.0 { format!("{odds}:1") } else { format!("1:{odds}") }
+}
+
 /// A probability for people; nothing that was estimated is certain.
 #[must_use]
 pub fn sure(probability: f64) -> String {

@@ -1,7 +1,11 @@
 //! Joints proved by physics: the recorded hand opens and closes them in rapier, and so it does their rivals (ours).
 
 pub mod replay;
+pub mod rivals;
 pub mod verdict;
+pub mod world;
 
 pub use replay::{Drive, Replay, simulate};
+pub use rivals::Resolution;
 pub use verdict::{ClipCheck, JointCheck, RivalCheck, Validation, Verdict, validate};
+pub use world::{Contact, Surroundings};

@@ -1,222 +1,240 @@
-//! One part in a rapier world, pulled by a compliant hand along a recorded path.
+//! One part pulled by a compliant hand along a recorded path, and pushed back.
 
-use rapier3d::prelude::{
-    ColliderBuilder, GenericJointBuilder, JointAxesMask, JointAxis, PhysicsWorld, Pose as RapierPose, RigidBodyBuilder,
-    RigidBodyHandle, Vector as RapierVector,
-};
 use serde::{Deserialize, Serialize};
 
+use super::world::{Contact, Surroundings, World, effort};
 use crate::articulation::{Articulation, JointKind};
 use crate::config;
 use crate::error::{Error, Result};
-use crate::math::{Point, Vector};
-use crate::twin::{OrientedBox, Part};
+use crate::math::{Point, Vector, reject};
+use crate::twin::{Part, mass_properties};
 
 /// Where the hand wants the grip to be.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drive {
     /// Seconds, not decreasing, from 0.
     pub times_secs: Vec<f64>,
-    /// World positions.
+    /// World positions, one for each time.
     pub path: Vec<Point>,
     /// The grip on the part when closed, world.
     pub grip: Point,
+    /// Whether the hand then takes the part back the same way.
+    pub back: bool,
 }
 
-/// What surrounds the part.
-#[derive(Debug, Clone, Copy)]
-pub struct Surroundings<'a> {
-    /// Boxes fixed in the world, world frame.
-    pub obstacles: &'a [OrientedBox],
-    /// Against gravity, unit.
-    pub up: &'a Vector,
-    /// Density of the part's boxes, kg/m^3.
-    pub density: f64,
-}
-
-/// What the simulation showed.
+/// What the simulation showed. All but `return_error` and `contacts` is about the way there.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Replay {
     /// Root mean square distance between hand and handle, metres.
     pub rms_m: f64,
     /// Largest distance between hand and handle, metres.
     pub max_m: f64,
+    /// Root mean square of the distance's part along the joint's axis, metres.
+    pub along_m: f64,
+    /// Root mean square of the distance's part across the joint's axis, metres.
+    pub across_m: f64,
     /// Largest force of the hand, newton.
     pub peak_force_n: f64,
+    /// Largest torque of the hand about the hinge, N m; along a slide its largest force, N.
+    pub peak_effort: f64,
     /// Opening at the start, rad or m.
     pub start: f64,
-    /// Least and largest opening reached.
+    /// Least and largest opening reached, rad or m.
     pub reached: [f64; 2],
-    /// Opening left after the hand brought the part back along its path, relative to the start.
+    /// Steps of the simulation at the closed and at the open limit with the hand pulling beyond it.
+    pub limit_steps: [usize; 2],
+    /// Opening left after the hand brought the part back along its path, relative to the start; 0 where it did not.
     pub return_error: f64,
-    /// Time, opening, hand force, distance between hand and handle: about thirty a second.
+    /// What the part touched, the strongest contact first.
+    pub contacts: Vec<Contact>,
+    /// Solids of the part and others that share space or touch when closed: there are no contacts between them.
+    pub closed_overlaps: Vec<[String; 2]>,
+    /// Largest energy of the part's motion, J.
+    pub kinetic_max_j: f64,
+    /// Most work that hand and weight had done on the part, J: its motion cannot hold more.
+    pub work_max_j: f64,
+    /// Furthest that the part was off its joint, metres.
+    pub drift_m: f64,
+    /// Time (s), opening (rad or m), hand force (N), distance between hand and handle (m): about thirty a second.
     pub trace: Vec<[f64; 4]>,
+    /// The hand at the times of the trace, world.
+    pub hand: Vec<Point>,
+    /// The grip on the part at the times of the trace, world.
+    pub handle: Vec<Point>,
+    /// The grip on the closed part, world.
+    pub grip: Point,
 }
 
-/// Converts to the simulation's single precision, relative to `origin`: rooms may lie far from the world's origin.
-fn local(p: &Point, origin: &Point) -> RapierVector {
-    (p - origin).cast::<f32>().into()
+impl Replay {
+    /// The deepest that the part was inside anything, metres, and inside what.
+    #[must_use]
+    pub fn worst_penetration(&self) -> Option<(f64, &str)> {
+        self.contacts
+            .iter()
+            .filter(|c| c.depth_m > 0.0)
+            .max_by(|a, b| a.depth_m.total_cmp(&b.depth_m))
+            .map(|c| (c.depth_m, c.with.as_str()))
+    }
 }
 
-fn collider(shape: &OrientedBox, origin: &Point, density: f32) -> ColliderBuilder {
-    let pose = crate::math::Pose::from_parts((shape.center - origin).into(), shape.orientation()).cast::<f32>();
-    let half = shape.half.cast::<f32>();
-    // Boards and fronts of furniture slide on each other more than they stick.
-    ColliderBuilder::cuboid(half.x, half.y, half.z).position(RapierPose::from(pose)).density(density).friction(0.2)
-}
+/// At rest between the two ways, and after them.
+const REST_SECS: f64 = 0.25;
 
-/// Pulls `part` along `drive` and back under `joint` (which may be a rival of the part's own) with the limits 0..`upper`.
+/// Pulls `part` along `drive` under `joint` (which may be a rival of the part's own) with the limits 0..`upper`.
+///
+/// The hand is a spring and a damper of `hand_stiffness_n_per_m`, critical on the mass of the part, and no stronger than
+/// `hand_force_max_n`. Fingers move on a handle: within `grip_slack_m` the spring does not pull.
 ///
 /// # Errors
-/// Where the simulation gives no finite state.
+/// Where the simulation gives no finite state, or the path's times cannot be seconds of one motion.
 pub fn simulate(
     part: &Part,
     joint: &Articulation,
     upper: f64,
-    around: Surroundings,
+    around: &Surroundings,
     drive: &Drive,
     config: &config::Validation,
 ) -> Result<Replay> {
+    // A person opens a part within seconds; ten minutes are another unit.
+    const MAX_SECS: f64 = 600.0;
     let (Some(&first), Some(&end)) = (drive.path.first(), drive.times_secs.last()) else {
         return Err(Error::Simulation(format!("{}: an empty path", part.id)));
     };
-    let Surroundings { obstacles, up, density } = around;
-    // A person opens a part within seconds; ten minutes are another unit.
-    const MAX_SECS: f64 = 600.0;
     if !(0.0..=MAX_SECS).contains(&end) {
         return Err(Error::Simulation(format!(
             "{}: the recorded hand takes {end:.3e} s; time stamps must be seconds and must not go back",
             part.id
         )));
     }
-    let origin = joint.origin;
     let dt = config.step_secs;
-    let mut world = PhysicsWorld::new();
-    world.gravity = (up * -9.81).cast::<f32>().into();
-    world.integration_parameters.dt = dt as f32;
-    let base = world.insert_body(RigidBodyBuilder::fixed());
-    // A body of their own: the joint switches contacts off between the two bodies that it connects.
-    let fixed = world.insert_body(RigidBodyBuilder::fixed());
-    for shape in obstacles {
-        world.insert_collider(collider(shape, &origin, 0.0), Some(fixed));
-    }
-    let body = world.insert_body(RigidBodyBuilder::dynamic().can_sleep(false));
-    for solid in &part.solids {
-        world.insert_collider(collider(&solid.shape, &origin, density as f32), Some(body));
-    }
-    let axis: RapierVector = joint.axis.cast::<f32>().into();
-    let (locked, free) = match joint.kind {
-        JointKind::Revolute => (JointAxesMask::LOCKED_REVOLUTE_AXES, JointAxis::AngX),
-        JointKind::Prismatic => (JointAxesMask::LOCKED_PRISMATIC_AXES, JointAxis::LinX),
-    };
-    let data = GenericJointBuilder::new(locked)
-        .local_axis1(axis)
-        .local_axis2(axis)
-        .limits(free, [0.0, upper as f32])
-        .contacts_enabled(false)
-        .build();
-    let handle = world
-        .insert_multibody_joint(base, body, data)
-        .ok_or_else(|| Error::Simulation(format!("{}: rapier refused the joint", part.id)))?;
     let start = joint.opening_at(&drive.grip, &first).clamp(0.0, upper);
-    if let Some((multibody, _)) = world.multibody_joints.get_mut(handle) {
-        // The first pass learns that the root is fixed, which leaves the joint's single degree of freedom.
-        multibody.forward_kinematics(&world.bodies, true);
-        if multibody.damping().len() != 1 {
-            return Err(Error::Simulation(format!("{}: {} degrees of freedom", part.id, multibody.damping().len())));
-        }
-        // rapier damps angular joints by 0.1 unless told otherwise.
-        multibody.damping_mut().fill(part.joint.damping as f32);
-        multibody.frictions_mut().fill(part.joint.friction as f32);
-        multibody.apply_displacements(&[start as f32]);
-        multibody.forward_kinematics(&world.bodies, false);
-        multibody.update_rigid_bodies(&mut world.bodies, true);
-    }
+    let mut world = World::new(part, joint, upper, start, around, dt)?;
 
-    let mass: f64 = part.solids.iter().map(|s| s.shape.volume() * density).sum();
-    // Critical damping of the hand on the mass it moves.
-    let hand_damping = 2.0 * (config.hand_stiffness_n_per_m * mass.max(0.1)).sqrt();
-    let grip_local = Point::from(drive.grip - origin);
-    let grip_now = |world: &PhysicsWorld, body: RigidBodyHandle| -> (Point, Vector) {
-        let b = &world.bodies[body];
-        let pose: nalgebra::Isometry3<f32> = (*b.position()).into();
-        let p = origin + (pose.cast::<f64>() * grip_local).coords;
-        let v: nalgebra::Vector3<f32> = b.velocity_at_point(local(&p, &origin)).into();
-        (p, v.cast::<f64>())
-    };
-    // There and back; in between the hand rests where it let go.
-    const REST_SECS: f64 = 0.25;
+    let properties = mass_properties(&part.solids, around.density);
+    let mass = properties.map_or(0.0, |m| m.mass);
+    let damping = 2.0 * (config.hand_stiffness_n_per_m * mass.max(0.1)).sqrt();
     let target = |t: f64| -> Point {
         let t = if t <= end { t } else { (2.0 * end + REST_SECS - t).clamp(0.0, end) };
         at(&drive.times_secs, &drive.path, t)
     };
-    let steps = (((2.0 * end + 2.0 * REST_SECS) / dt).ceil() as usize).max(1);
     let forward = ((end / dt).ceil() as usize).max(1);
-    let (mut sum, mut max_m, mut peak) = (0.0, 0.0f64, 0.0f64);
-    let mut reached = [start, start];
-    let mut trace = Vec::new();
+    let steps = if drive.back { (((2.0 * end + 2.0 * REST_SECS) / dt).ceil() as usize).max(forward) } else { forward };
     let every = ((1.0 / 30.0 / dt).round() as usize).max(1);
+
+    // Weight does its work at the centre of mass.
+    let center = properties.map(|m| m.center).filter(|_| !part.joint.balanced);
+    let height = |world: &World| center.map_or(0.0, |c| (world.point(&c).0 - c).dot(around.up));
+    let height_at_start = height(&world);
+    let mut hand_work = 0.0;
+
+    let mut out = Replay {
+        rms_m: 0.0,
+        max_m: 0.0,
+        along_m: 0.0,
+        across_m: 0.0,
+        peak_force_n: 0.0,
+        peak_effort: 0.0,
+        start,
+        reached: [start, start],
+        limit_steps: [0, 0],
+        return_error: 0.0,
+        contacts: Vec::new(),
+        closed_overlaps: world.closed_overlaps(),
+        kinetic_max_j: 0.0,
+        work_max_j: 0.0,
+        drift_m: 0.0,
+        trace: Vec::new(),
+        hand: Vec::new(),
+        handle: Vec::new(),
+        grip: drive.grip,
+    };
+    let (mut sum, mut sum_along) = (0.0, 0.0);
     let mut opening = start;
     for step in 0..steps {
         let t = step as f64 * dt;
         let wanted = target(t);
         let wanted_velocity = (target(t + dt) - wanted) / dt;
-        let (p, v) = grip_now(&world, body);
-        let mut force = (wanted - p) * config.hand_stiffness_n_per_m + (wanted_velocity - v) * hand_damping;
-        let strength = force.norm();
-        if !strength.is_finite() {
+        let (p, v) = world.point(&drive.grip);
+        let force = pull(&(wanted - p), &(wanted_velocity - v), damping, config);
+        if !force.norm().is_finite() {
             return Err(Error::Simulation(format!("{}: the state is not finite after {t:.2} s", part.id)));
         }
-        if strength > config.hand_force_max_n {
-            force *= config.hand_force_max_n / strength;
-        }
-        if let Some(b) = world.bodies.get_mut(body) {
-            b.reset_forces(false);
-            b.reset_torques(false);
-            b.add_force_at_point(force.cast::<f32>().into(), local(&p, &origin), true);
-        }
-        world.step();
-        let (p, _) = grip_now(&world, body);
-        let angle = joint.opening_at(&drive.grip, &p);
+        world.step(&p, &force);
+        let (now, _) = world.point(&drive.grip);
+        let angle = joint.opening_at(&drive.grip, &now);
         // Continuous past half a turn.
         opening = if joint.kind == JointKind::Revolute {
             angle - ((angle - opening) / std::f64::consts::TAU).round() * std::f64::consts::TAU
         } else {
             angle
         };
-        if step < forward {
-            let error = (target(t + dt) - p).norm();
-            sum += error * error;
-            max_m = max_m.max(error);
-            peak = peak.max(force.norm());
-            reached = [reached[0].min(opening), reached[1].max(opening)];
-            if step % every == 0 {
-                trace.push([t, opening, force.norm(), error]);
-            }
+        if step >= forward {
+            continue;
+        }
+        let strength = force.norm();
+        let turning = effort(joint, &now, &force);
+        let error = target(t + dt) - now;
+        let distance = error.norm();
+        sum += distance * distance;
+        sum_along += error.dot(&joint.axis).powi(2);
+        hand_work += force.dot(&(now - p));
+        let weight_work = -9.81 * mass * (height(&world) - height_at_start);
+        out.max_m = out.max_m.max(distance);
+        out.peak_force_n = out.peak_force_n.max(strength);
+        out.peak_effort = out.peak_effort.max(turning.abs());
+        out.reached = [out.reached[0].min(opening), out.reached[1].max(opening)];
+        out.kinetic_max_j = out.kinetic_max_j.max(world.kinetic_energy());
+        out.work_max_j = out.work_max_j.max(hand_work + weight_work);
+        out.drift_m = out.drift_m.max(drift(&world, joint));
+        // Within a thousandth of a radian or a millimetre of a stop the part stands at it.
+        const AT_STOP: f64 = 1e-3;
+        out.limit_steps[0] += usize::from(opening < AT_STOP && turning < 0.0);
+        out.limit_steps[1] += usize::from(opening > upper - AT_STOP && turning > 0.0);
+        if step % every == 0 {
+            out.trace.push([t, opening, strength, distance]);
+            out.hand.push(target(t + dt));
+            out.handle.push(now);
         }
     }
-    if !world.quarantine().is_empty() {
+    if world.broke() {
         return Err(Error::Simulation(format!("{}: rapier put the part in quarantine", part.id)));
     }
-    Ok(Replay {
-        rms_m: (sum / forward as f64).sqrt(),
-        max_m,
-        peak_force_n: peak,
-        start,
-        reached,
-        return_error: opening - start,
-        trace,
-    })
+    let count = forward as f64;
+    out.rms_m = (sum / count).sqrt();
+    out.along_m = (sum_along / count).sqrt();
+    out.across_m = ((sum - sum_along).max(0.0) / count).sqrt();
+    out.return_error = if drive.back { opening - start } else { 0.0 };
+    out.contacts = world.contacts();
+    Ok(out)
+}
+
+/// Force of the hand for its distance from the grip and the difference of their velocities.
+fn pull(distance: &Vector, velocity: &Vector, damping: f64, config: &config::Validation) -> Vector {
+    let far = distance.norm();
+    let taut = if far > config.grip_slack_m { 1.0 - config.grip_slack_m / far } else { 0.0 };
+    let force = distance * (taut * config.hand_stiffness_n_per_m) + velocity * damping;
+    let strength = force.norm();
+    if strength > config.hand_force_max_n { force * (config.hand_force_max_n / strength) } else { force }
+}
+
+/// How far the part is off its joint: the hinge's point and, a metre along it, its direction; the slide's side steps.
+fn drift(world: &World, joint: &Articulation) -> f64 {
+    let (shift, turn) = world.moved();
+    match joint.kind {
+        JointKind::Revolute => shift.norm().max((turn * joint.axis - joint.axis).norm()),
+        JointKind::Prismatic => reject(&shift, &joint.axis).norm().max(turn.angle()),
+    }
 }
 
 /// Position on a path at time `t`, linear between samples.
 fn at(times: &[f64], path: &[Point], t: f64) -> Point {
+    let last = path.len().min(times.len()).saturating_sub(1);
     let i = times.partition_point(|&x| x <= t);
     if i == 0 {
         return path[0];
     }
-    if i >= path.len() {
-        return path[path.len() - 1];
+    if i > last {
+        return path[last];
     }
     let span = times[i] - times[i - 1];
     let share = if span > 0.0 { (t - times[i - 1]) / span } else { 1.0 };

@@ -3,13 +3,17 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::replay::{Drive, Replay, Surroundings, simulate};
+use super::replay::{Drive, Replay, simulate};
+use super::rivals::{Evidence, REVERSED, Resolution, Rival, anchored, distance2, log_likelihood, path_distance2};
+use super::rivals::{resolution, rivals};
+use super::world::Surroundings;
 use crate::articulation::{Action, Articulation, JointKind};
 use crate::config;
 use crate::error::Result;
 use crate::hands::Trajectory;
-use crate::math::{Vector, stats};
-use crate::twin::{Furniture, OrientedBox, Twin};
+use crate::inference::observed_range;
+use crate::math::{Point, Vector, centroid, stats};
+use crate::twin::{Furniture, Part, Twin};
 
 /// What physics says about a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -35,13 +39,30 @@ impl Verdict {
     }
 }
 
-/// A rival's replay of the same hand.
+/// A rival against the joint, over all clips.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RivalCheck {
-    /// What it is: "mirrored hinge", "slide", ...
+    /// What it is: "hinge on the left", "slide straight out", ...
+    pub name: String,
+    /// The rival joint.
+    pub articulation: Articulation,
+    /// Root mean square distance of the hands from the path that it forces on them, metres.
+    pub distance_m: f64,
+    /// How much more likely the joint makes the hands than this rival does, nats; negative where the rival does better.
+    pub margin_nats: f64,
+}
+
+/// The best rival's replay of a clip, without obstacles and one way.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RivalReplay {
+    /// The rival's name.
     pub name: String,
     /// Tracking error, metres.
     pub rms_m: f64,
+    /// Largest force of the hand, newton.
+    pub peak_force_n: f64,
+    /// The grip on the part at the times of the joint's own trace, world.
+    pub handle: Vec<Point>,
 }
 
 /// One clip's replay.
@@ -53,12 +74,18 @@ pub struct ClipCheck {
     pub action: Action,
     /// Opening that the hand went through under this joint, rad or m.
     pub observed_range: f64,
-    /// Among the furniture of the scene.
+    /// Root mean square distance of the hand from the path that the joint forces on it, metres.
+    pub distance_m: f64,
+    /// The same with the handle held where the other clips held it, metres; `None` for an only clip.
+    pub held_out_rms_m: Option<f64>,
+    /// Noise of the hand that no joint explains, metres.
+    pub noise_m: f64,
+    /// How many independent samples the clip is worth.
+    pub samples: f64,
+    /// Among the furniture and walls of the scene.
     pub replay: Replay,
-    /// Tracking error without the rest of the scene: what the rivals are compared with, metres.
-    pub free_rms_m: f64,
-    /// The rivals on the same hand, best first.
-    pub rivals: Vec<RivalCheck>,
+    /// The best rival's.
+    pub rival: Option<RivalReplay>,
 }
 
 /// One joint's verdict.
@@ -76,8 +103,12 @@ pub struct JointCheck {
     pub peak_force_n: f64,
     /// Share of the observed range that the simulated part went through, least over the clips.
     pub reached_share: f64,
-    /// Least over the clips of (best rival's error / own error).
-    pub margin: Option<f64>,
+    /// How much more likely the joint makes the hands of all clips than its best rival does, nats; `None` without clips.
+    pub margin_nats: Option<f64>,
+    /// The errors of the joint that its clips would show.
+    pub resolves: Option<Resolution>,
+    /// The rivals, best first.
+    pub rivals: Vec<RivalCheck>,
     /// One entry a clip.
     pub clips: Vec<ClipCheck>,
 }
@@ -110,148 +141,276 @@ pub fn validate(twin: &Twin, hands: &[Hands], up: &Vector, config: &config::Vali
         .par_iter()
         .enumerate()
         .map(|(i, furniture)| {
-            let empty = Hands::new();
-            let clips = hands.get(i).unwrap_or(&empty);
-            let obstacles = obstacles(twin, i);
-            let around = Surroundings { obstacles: &obstacles, up, density: twin.density_kg_per_m3 };
-            let checks: Vec<ClipCheck> =
-                clips.iter().map(|(name, t)| check_clip(name, t, furniture, around, config)).collect::<Result<_>>()?;
-            Ok(judge(furniture, checks, config))
+            let around = Surroundings::of(twin, i, up);
+            check_joint(furniture, hands.get(i).map(Vec::as_slice).unwrap_or_default(), &around, config)
         })
         .collect::<Result<_>>()?;
     Ok(Validation { joints })
 }
 
-/// Everything else in the scene, closed.
-fn obstacles(twin: &Twin, moving: usize) -> Vec<OrientedBox> {
-    twin.furniture
-        .iter()
-        .enumerate()
-        .filter(|(i, _)| *i != moving)
-        .flat_map(|(_, f)| f.carcass.iter().chain(&f.part.solids))
-        .map(|s| s.shape)
-        .collect()
-}
-
-fn check_clip(
-    name: &str,
-    trajectory: &Trajectory,
+/// Rivals over all clips in closed form, the joint and its best rival replayed on each.
+fn check_joint(
     furniture: &Furniture,
-    around: Surroundings,
+    hands: &[(String, &Trajectory)],
+    around: &Surroundings,
     config: &config::Validation,
-) -> Result<ClipCheck> {
-    let path = trajectory.positions();
-    let t0 = trajectory.samples.first().map_or(0.0, |s| s.time_secs);
-    let times_secs: Vec<f64> = trajectory.samples.iter().map(|s| s.time_secs - t0).collect();
-    let grip = trajectory.closed_grip();
+) -> Result<JointCheck> {
     let part = &furniture.part;
     let own = part.joint.articulation;
-    let drive = Drive { times_secs, path, grip };
-    // Rivals get all the room they want: what is compared is how well the motion fits, not a limit.
-    let ample = |j: &Articulation| if j.kind == JointKind::Revolute { std::f64::consts::PI } else { 2.0 };
-    let replay = simulate(part, &own, part.joint.upper, around, &drive, config)?;
-    let alone = Surroundings { obstacles: &[], ..around };
-    let free = simulate(part, &own, ample(&own), alone, &drive, config)?;
-    let mut rivals = Vec::new();
-    for (name, rival) in rivals_of(furniture, &trajectory.closed_grip()) {
-        let r = simulate(part, &rival, ample(&rival), alone, &drive, config)?;
-        rivals.push(RivalCheck { name, rms_m: r.rms_m });
+    let (named, clips): (Vec<(&str, Action)>, Vec<Evidence>) = hands
+        .iter()
+        .filter_map(|(name, t)| Evidence::of(t, config).map(|clip| ((name.as_str(), t.action), clip)))
+        .unzip();
+    let closed: Vec<Point> = clips.iter().map(|c| c.closed).collect();
+    let mut compared = Vec::new();
+    if let Some(grip) = centroid(&closed) {
+        let likely = log_likelihood(&own, &clips, config);
+        for Rival { name, articulation } in rivals(part, &grip, config) {
+            compared.push(RivalCheck {
+                name,
+                articulation,
+                distance_m: pooled_distance(&articulation, &clips),
+                margin_nats: likely - log_likelihood(&articulation, &clips, config),
+            });
+        }
     }
-    rivals.sort_by(|a, b| a.rms_m.total_cmp(&b.rms_m));
-    Ok(ClipCheck {
-        clip: name.to_owned(),
-        action: trajectory.action,
-        observed_range: crate::inference::observed_range(&own, &grip, &drive.path),
-        replay,
-        free_rms_m: free.rms_m,
-        rivals,
+    compared.sort_by(|a, b| a.margin_nats.total_cmp(&b.margin_nats));
+    let replayed = named
+        .iter()
+        .zip(&clips)
+        .enumerate()
+        .map(|(i, (&(name, action), clip))| {
+            let grip = anchored(&own, clip);
+            let drive = Drive { times_secs: clip.times_secs.clone(), path: clip.path.clone(), grip, back: true };
+            let rival = match compared.first() {
+                Some(best) => Some(replay_rival(part, best, clip, around, config)?),
+                None => None,
+            };
+            Ok(ClipCheck {
+                clip: name.to_owned(),
+                action,
+                observed_range: observed_range(&own, &grip, &clip.path),
+                distance_m: distance2(&own, clip).sqrt(),
+                held_out_rms_m: held_out(&own, &clips, i),
+                noise_m: clip.noise_m,
+                samples: clip.samples,
+                replay: simulate(part, &own, part.joint.upper, around, &drive, config)?,
+                rival,
+            })
+        })
+        .collect::<Result<Vec<ClipCheck>>>()?;
+    let resolves = (!clips.is_empty()).then(|| resolution(&own, &clips, config));
+    Ok(judge(part, replayed, compared, resolves, config))
+}
+
+/// A rival pulled by the same hand. It gets all the room it wants: what is compared is how well the motion fits.
+fn replay_rival(
+    part: &Part,
+    rival: &RivalCheck,
+    clip: &Evidence,
+    around: &Surroundings,
+    config: &config::Validation,
+) -> Result<RivalReplay> {
+    let joint = rival.articulation;
+    // Half a turn; two metres of slide.
+    let upper = if joint.kind == JointKind::Revolute { std::f64::consts::PI } else { 2.0 };
+    let drive = Drive {
+        times_secs: clip.times_secs.clone(),
+        path: clip.path.clone(),
+        grip: anchored(&joint, clip),
+        back: false,
+    };
+    let alone = Surroundings::none(around.up, around.density);
+    let replay = simulate(part, &joint, upper, &alone, &drive, config)?;
+    Ok(RivalReplay {
+        name: rival.name.clone(),
+        rms_m: replay.rms_m,
+        peak_force_n: replay.peak_force_n,
+        handle: replay.handle,
     })
 }
 
-/// What else the part could be: hinged at each other edge of its front, or sliding straight out.
-fn rivals_of(furniture: &Furniture, grip: &crate::math::Point) -> Vec<(String, Articulation)> {
-    let part = &furniture.part;
-    let own = part.joint.articulation;
-    let bounds = &part.bounds;
-    let [right, up, out] = [0, 1, 2].map(|i| bounds.rotation.column(i).into_owned());
-    let mut rivals = Vec::new();
-    for (axis, across, half, names) in [
-        (up, right, bounds.half.x, ["left hinge", "right hinge"]),
-        (right, up, bounds.half.y, ["lower hinge", "upper hinge"]),
-    ] {
-        for (name, sign) in names.into_iter().zip([-1.0, 1.0]) {
-            let origin = bounds.center + across * (half * sign);
-            let hinge = Articulation { kind: JointKind::Revolute, axis, origin };
-            let opens_out = axis.cross(&(grip - origin)).dot(&out) >= 0.0;
-            let hinge = if opens_out { hinge } else { hinge.reversed() };
-            let near = own.kind == JointKind::Revolute
-                && crate::math::unsigned_angle(&axis, &own.axis) < 0.3
-                && own.line().distance(&origin) < 0.5 * half.max(0.1);
-            // A hinge through the hand explains nothing and would not be built.
-            if !near && hinge.line().distance(grip) > 0.05 {
-                rivals.push((name.to_owned(), hinge));
-            }
-        }
-    }
-    if own.kind == JointKind::Revolute {
-        rivals
-            .push(("slide".to_owned(), Articulation { kind: JointKind::Prismatic, axis: out, origin: bounds.center }));
-    }
-    rivals
+/// Root mean square over all samples of all clips.
+fn pooled_distance(joint: &Articulation, clips: &[Evidence]) -> f64 {
+    let count: usize = clips.iter().map(|c| c.path.len()).sum();
+    let sum: f64 = clips.iter().map(|c| distance2(joint, c) * c.path.len() as f64).sum();
+    (sum / count.max(1) as f64).sqrt()
 }
 
-/// The rules, in the order in which they speak.
-fn judge(furniture: &Furniture, clips: Vec<ClipCheck>, config: &config::Validation) -> JointCheck {
-    let part = &furniture.part;
-    let hinge = part.joint.articulation.kind == JointKind::Revolute;
-    let least = if hinge { config.min_turn_deg.to_radians() } else { config.min_travel_m };
-    let range = clips.iter().map(|c| c.observed_range).fold(0.0, f64::max);
-    // A clip that hardly moves the part says nothing against it, unless there is no other.
-    let telling: Vec<&ClipCheck> = clips.iter().filter(|c| range < least || c.observed_range >= least).collect();
-    let errors: Vec<f64> = telling.iter().map(|c| c.replay.rms_m).collect();
-    let rms_m = stats::median(&errors).unwrap_or(0.0);
-    let peak_force_n = telling.iter().map(|c| c.replay.peak_force_n).fold(0.0, f64::max);
-    let share = |c: &&ClipCheck| {
-        let range = c.observed_range.max(1e-6);
-        ((c.replay.reached[1] - c.replay.reached[0]) / range).min(1.0)
-    };
-    let reached_share = telling.iter().map(share).fold(1.0, f64::min);
-    // Errors below half a centimetre are equal.
-    let closest = telling
-        .iter()
-        .filter_map(|c| c.rivals.first().map(|r| (r.rms_m.max(0.005) / c.free_rms_m.max(0.005), r.name.as_str())))
-        .min_by(|a, b| a.0.total_cmp(&b.0));
-    let margin = closest.map(|(m, _)| m);
-    let best_rival = closest.map_or("", |(_, name)| name).to_owned();
-    let amount = |x: f64| if hinge { format!("{:.0}°", x.to_degrees()) } else { format!("{:.0} cm", 100.0 * x) };
+/// How far clip `i` is from the joint's path through where the other clips held the handle.
+fn held_out(joint: &Articulation, clips: &[Evidence], i: usize) -> Option<f64> {
+    let grips: Vec<Point> =
+        clips.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, c)| anchored(joint, c)).collect();
+    let clip = clips.get(i)?;
+    centroid(&grips).map(|grip| path_distance2(joint, &grip, &clip.path).sqrt())
+}
 
-    let (verdict, reason) = if clips.is_empty() {
+/// The verdict.
+///
+/// **Fail**, where any of these holds:
+/// - *A rival refutes it*: the best rival makes the hands of all clips more likely by `margin_nats` and by what the best of
+///   so many rivals gains by chance (the logarithm of their number), and is itself not refuted: within twice `pass_rms_m`.
+/// - *It is blocked*: on some clip the part goes through less than `pass_range_share` of the observed range, and what lacks
+///   at the handle is more than grip and noise make up: the slack at both ends, and two standard deviations of the difference
+///   of two positions of the hand. What it ran into is named.
+/// - *It cannot follow*: on more than half of the clips the tracking error is above twice `pass_rms_m` and above twice the
+///   noise that is left when any hinge or slide may explain the hand. Where none does, the hand is to blame.
+///
+/// **Undetermined**, else, where there is no hand, where the tracking error is above `pass_rms_m`, or where the best rival is
+/// within `margin_nats`: a motion too small for its noise cannot tell them apart. As rivals stand `rival_shift_m` beside a
+/// hinge, what passes is at least known to that.
+///
+/// **Pass** else.
+fn judge(
+    part: &Part,
+    clips: Vec<ClipCheck>,
+    rivals: Vec<RivalCheck>,
+    resolves: Option<Resolution>,
+    config: &config::Validation,
+) -> JointCheck {
+    let kind = part.joint.articulation.kind;
+    let errors: Vec<f64> = clips.iter().map(|c| c.replay.rms_m).collect();
+    let rms_m = stats::median(&errors).unwrap_or(0.0);
+    let range = clips.iter().map(|c| c.observed_range).fold(0.0, f64::max);
+    let best = rivals.first();
+    let mut faults: Vec<String> = Vec::new();
+    if let Some(rival) = best.filter(|r| {
+        r.margin_nats <= -config.margin_nats - (rivals.len() as f64).ln() && r.distance_m <= 2.0 * config.pass_rms_m
+    }) {
+        faults.push(if rival.name == REVERSED {
+            "the recorded hand opens it the other way".to_owned()
+        } else {
+            let own = pooled_over(&clips);
+            format!(
+                "a {} explains the recorded hand better: to {} instead of {}",
+                rival.name,
+                centimetres(rival.distance_m),
+                centimetres(own)
+            )
+        });
+    }
+    let blocked = clips.iter().filter_map(|c| blocked(part, c, config)).max_by(|a, b| a.0.total_cmp(&b.0));
+    faults.extend(blocked.map(|(_, why)| why));
+    let off = clips.iter().filter(|c| c.replay.rms_m > 2.0 * config.pass_rms_m.max(c.noise_m)).count();
+    if 2 * off > clips.len() {
+        faults.push(format!("the handle stays {} (RMS) away from the recorded hand", centimetres(rms_m)));
+    }
+    let margin_nats = best.map(|r| r.margin_nats);
+    let (verdict, reason) = if !faults.is_empty() {
+        (Verdict::Fail, faults.join("; "))
+    } else if clips.is_empty() {
         (Verdict::Undetermined, "no recorded hand to replay".to_owned())
-    } else if margin.is_some_and(|m| m < 1.0 / config.rival_margin) {
-        (Verdict::Fail, format!("a {best_rival} explains the recorded hand better"))
-    } else if rms_m > 2.0 * config.pass_rms_m {
-        let text = format!("the handle stays {:.1} cm (RMS) away from the recorded hand", 100.0 * rms_m);
-        (Verdict::Fail, text)
-    } else if rms_m > config.pass_rms_m && reached_share >= config.pass_range_share {
-        let text = format!(
-            "follows the recorded hand better than its rivals, but only to {:.1} cm: hinge or hand are off",
-            100.0 * rms_m
-        );
+    } else if rms_m > config.pass_rms_m {
+        let noises: Vec<f64> = clips.iter().map(|c| c.noise_m).collect();
+        let noise = stats::median(&noises).unwrap_or(0.0);
+        let text = if noise > config.pass_rms_m {
+            format!("the recorded hand trembles by {}: no joint could be told from it", centimetres(noise))
+        } else {
+            format!("follows the recorded hand only to {}: hinge or hand are off", centimetres(rms_m))
+        };
         (Verdict::Undetermined, text)
-    } else if reached_share < config.pass_range_share {
-        let text = format!(
-            "the part goes through only {:.0} % of the range that the hand went through",
-            100.0 * reached_share
-        );
-        (Verdict::Fail, text)
-    } else if range < least {
-        let text = format!("the part moved by only {}: too little to tell a hinge from a slide", amount(range));
+    } else if let Some(rival) = best.filter(|r| r.margin_nats < config.margin_nats) {
+        let text = if rival.margin_nats > 0.0 {
+            format!("over {} a {} would look about the same", amount(kind, range), rival.name)
+        } else {
+            format!("over {} a {} looks even a little better", amount(kind, range), rival.name)
+        };
         (Verdict::Undetermined, text)
-    } else if margin.is_some_and(|m| m < config.rival_margin) {
-        (Verdict::Undetermined, format!("a {best_rival} explains the recorded hand about as well"))
     } else {
-        let rivals = margin.map_or(String::new(), |m| format!("; the best rival ({best_rival}) is {m:.1} times worse"));
-        (Verdict::Pass, format!("follows the recorded hand to {:.1} cm over {}{rivals}", 100.0 * rms_m, amount(range)))
+        let rivals = best.map_or(String::new(), |r| {
+            format!("; the best rival, a {}, is {} as likely", r.name, one_in(r.margin_nats))
+        });
+        let sees = resolves.map_or(String::new(), |r| format!("; {}", sees(kind, &r)));
+        let text = format!("follows the recorded hand to {} over {}", centimetres(rms_m), amount(kind, range));
+        (Verdict::Pass, format!("{text}{rivals}{sees}"))
     };
-    JointCheck { id: part.id.clone(), verdict, reason, rms_m, peak_force_n, reached_share, margin, clips }
+    let share = |c: &ClipCheck| reached(c) / c.observed_range.max(1e-6);
+    JointCheck {
+        id: part.id.clone(),
+        verdict,
+        reason,
+        rms_m,
+        peak_force_n: clips.iter().map(|c| c.replay.peak_force_n).fold(0.0, f64::max),
+        reached_share: clips.iter().map(share).fold(1.0, f64::min),
+        margin_nats,
+        resolves,
+        rivals,
+        clips,
+    }
+}
+
+/// Root mean square of the clips' distances.
+fn pooled_over(clips: &[ClipCheck]) -> f64 {
+    let squares: Vec<f64> = clips.iter().map(|c| c.distance_m.powi(2)).collect();
+    stats::mean(&squares).unwrap_or(0.0).sqrt()
+}
+
+/// Opening that the simulated part went through.
+fn reached(clip: &ClipCheck) -> f64 {
+    clip.replay.reached[1] - clip.replay.reached[0]
+}
+
+/// What keeps a part from going where the hand went: metres lacking at the handle, and why in words.
+fn blocked(part: &Part, clip: &ClipCheck, config: &config::Validation) -> Option<(f64, String)> {
+    let joint = &part.joint;
+    let kind = joint.articulation.kind;
+    let lever = match kind {
+        JointKind::Revolute => joint.articulation.line().distance(&clip.replay.grip),
+        JointKind::Prismatic => 1.0,
+    };
+    let lacking = (clip.observed_range - reached(clip)) * lever;
+    let made_up = 2.0 * config.grip_slack_m + 2.0 * std::f64::consts::SQRT_2 * clip.noise_m.max(config.hand_std_m);
+    if reached(clip) >= config.pass_range_share * clip.observed_range || lacking <= made_up {
+        return None;
+    }
+    let replay = &clip.replay;
+    let why = if replay.limit_steps[1] > 0 {
+        format!("it stops at its limit of {}", amount(kind, joint.upper))
+    } else if let Some(contact) = replay.contacts.first() {
+        format!("its {} runs into {}", contact.solid, contact.with)
+    } else if replay.peak_force_n >= config.hand_force_max_n {
+        format!("it takes more than the {:.0} N of an arm", config.hand_force_max_n)
+    } else if replay.limit_steps[0] > 0 {
+        "the hand pushes it shut".to_owned()
+    } else {
+        "it does not follow".to_owned()
+    };
+    let text = format!(
+        "the part opens by {} of the {} that the hand went through: {why}",
+        amount(kind, reached(clip)),
+        amount(kind, clip.observed_range)
+    );
+    Some((lacking, text))
+}
+
+/// What a hinge or slide that is off by less would look like.
+fn sees(kind: JointKind, resolution: &Resolution) -> String {
+    let tilt = resolution.tilt_rad.map_or("any tilt".to_owned(), |t| format!("a tilt below {:.0}°", t.to_degrees()));
+    match kind {
+        JointKind::Prismatic => format!("{tilt} would look the same"),
+        JointKind::Revolute => {
+            let shift =
+                resolution.shift_m.map_or("any shift".to_owned(), |s| format!("a shift below {:.0} cm", 100.0 * s));
+            format!("{shift} or {tilt} would look the same")
+        }
+    }
+}
+
+/// How likely a rival is beside the joint: "1/20", "less than a millionth".
+fn one_in(nats: f64) -> String {
+    // Beyond this the hands' own model is in doubt, not the rival.
+    const MOST: f64 = 1e6;
+    let odds = nats.exp();
+    if odds > MOST { "less than a millionth".to_owned() } else { format!("1/{odds:.0}") }
+}
+
+fn amount(kind: JointKind, opening: f64) -> String {
+    match kind {
+        JointKind::Revolute => format!("{:.0}°", opening.to_degrees()),
+        JointKind::Prismatic => format!("{:.0} cm", 100.0 * opening),
+    }
+}
+
+fn centimetres(metres: f64) -> String {
+    format!("{:.1} cm", 100.0 * metres)
 }
