@@ -351,15 +351,15 @@ impl Model {
 pub fn read(path: &Path) -> Result<Model> {
     let text = xml::read_text(path)?;
     let root = xml::parse(path, &text)?;
-    match root.name.as_str() {
-        "robot" => urdf::from_element(path, &text, &root),
-        "mujoco" => mjcf::from_element(path, root),
-        other => Err(Error::format(
-            path,
-            format!("line {}", root.line),
-            format!("begins with <{}>; expected <robot> (URDF) or <mujoco> (MJCF)", xml::brief(other)),
-        )),
+    if root.name == "mujoco" {
+        return mjcf::from_element(path, root);
     }
+    if root.name == "robot" {
+        return urdf::from_element(path, &text, &root);
+    }
+    let place = format!("line {}", root.line);
+    let message = format!("begins with <{}>; expected <robot> (URDF) or <mujoco> (MJCF)", xml::brief(&root.name));
+    Err(Error::format(path, place, message))
 }
 
 /// Name of an XML file's first element.

@@ -184,10 +184,10 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Element> {
             return Err(at(format!("more than {MAX_ELEMENTS} elements")));
         }
         let Some(done) = done else { continue };
-        match (open.last_mut(), &root) {
+        match (open.last_mut(), root.is_some()) {
             (Some(parent), _) => parent.children.push(done),
-            (None, None) => root = Some(done),
-            (None, Some(_)) => return Err(at("a second outermost element; XML has one".to_owned())),
+            (None, false) => root = Some(done),
+            (None, true) => return Err(at("a second outermost element; XML has one".to_owned())),
         }
     }
     if let Some(unfinished) = open.last() {
