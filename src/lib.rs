@@ -37,6 +37,8 @@ pub mod recording;
 pub mod twin;
 pub mod vlm;
 
+pub mod model;
+
 pub mod synth;
 
 pub mod geometry;

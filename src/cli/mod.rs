@@ -3,10 +3,12 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command prints; the library does not")]
 
 mod ablate;
+mod check;
 mod config;
 mod demo;
 mod evaluate;
 mod export;
+mod foreign;
 mod infer;
 mod keep;
 mod measure;
@@ -56,7 +58,9 @@ enum Command {
     Infer(infer::InferArgs),
     /// Write a twin, or joints found elsewhere, as URDF, MJCF, glTF and USD
     Export(export::ExportArgs),
-    /// Simulate a twin's joints against its recorded hands
+    /// Check what a file alone tells of a model's fitness for simulation: anybody's URDF, MJCF or GLB
+    Check(check::CheckArgs),
+    /// Simulate a twin's, or anybody's model's, joints against recorded hands
     Validate(validate::ValidateArgs),
     /// Compare predictions with the truth
     Evaluate(evaluate::EvaluateArgs),
@@ -97,6 +101,7 @@ pub fn run() -> ExitCode {
         Command::Twin(args) => twin::run(&args),
         Command::Infer(args) => infer::run(&args),
         Command::Export(args) => export::run(&args),
+        Command::Check(args) => check::run(&args),
         Command::Validate(args) => validate::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Ablate(args) => ablate::run(&args),

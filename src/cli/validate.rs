@@ -1,48 +1,40 @@
 //! `paws validate`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
 use super::output::write_file;
 use super::twin::{JointHands, as_hands};
-use super::{Answer, ConfigFile, print};
+use super::{Answer, ConfigFile, foreign, print};
 use crate::json;
 use crate::math::Vector;
 use crate::report::table::aligned;
 use crate::report::words;
+use crate::twin::Twin;
 use crate::validation::{self, Verdict};
 
 #[derive(Debug, Args)]
 pub struct ValidateArgs {
-    /// The folder that `paws twin` wrote (twin.json and trajectories.json)
+    /// The folder that `paws twin` wrote (twin.json and trajectories.json), or a URDF or MJCF file
     twin: PathBuf,
     /// Write the report as JSON to this file
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    foreign: foreign::ForeignArgs,
     #[command(flatten)]
     config: ConfigFile,
 }
 
 pub fn run(args: &ValidateArgs) -> anyhow::Result<Answer> {
     let config = args.config.read()?;
-    let twin = super::export::read_twin(&args.twin)?;
-    // The same points that every exporter insists on: a broken twin is told before it is simulated.
-    crate::export::check(&twin)?;
-    let hands: Vec<JointHands> = json::read(&args.twin.join("trajectories.json"))?;
-    for (name, trajectory) in hands.iter().flat_map(|h| &h.clips) {
-        if let Err(fault) = trajectory.check() {
-            anyhow::bail!("{}: clip {name}: {fault}", args.twin.join("trajectories.json").display());
-        }
-    }
-    let in_order: Vec<JointHands> = twin
-        .furniture
-        .iter()
-        .map(|f| JointHands {
-            joint: f.part.id.clone(),
-            clips: hands.iter().filter(|h| h.joint == f.part.id).flat_map(|h| h.clips.clone()).collect(),
-        })
-        .collect();
+    let (twin, in_order) = if foreign::is_model(&args.twin) {
+        foreign::load(&args.twin, &args.foreign)?
+    } else {
+        args.foreign.refuse()?;
+        ours(&args.twin)?
+    };
     let report = validation::validate(&twin, &as_hands(&in_order), &Vector::z(), &config.validation)?;
     let header = [
         "joint",
@@ -87,4 +79,26 @@ pub fn run(args: &ValidateArgs) -> anyhow::Result<Answer> {
     }
     let refuted = report.joints.iter().any(|j| j.verdict == Verdict::Fail);
     Ok(if refuted { Answer::No } else { Answer::Yes })
+}
+
+/// The twin and the recorded hands of a folder of ours, the hands in the twin's order.
+fn ours(path: &Path) -> anyhow::Result<(Twin, Vec<JointHands>)> {
+    let twin = super::export::read_twin(path)?;
+    // The same points that every exporter insists on: a broken twin is told before it is simulated.
+    crate::export::check(&twin)?;
+    let hands: Vec<JointHands> = json::read(&path.join("trajectories.json"))?;
+    for (name, trajectory) in hands.iter().flat_map(|h| &h.clips) {
+        if let Err(fault) = trajectory.check() {
+            anyhow::bail!("{}: clip {name}: {fault}", path.join("trajectories.json").display());
+        }
+    }
+    let in_order = twin
+        .furniture
+        .iter()
+        .map(|f| JointHands {
+            joint: f.part.id.clone(),
+            clips: hands.iter().filter(|h| h.joint == f.part.id).flat_map(|h| h.clips.clone()).collect(),
+        })
+        .collect();
+    Ok((twin, in_order))
 }

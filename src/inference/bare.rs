@@ -99,7 +99,7 @@ pub fn infer(trajectory: &BareTrajectory, config: &config::Inference) -> Outcome
 }
 
 /// The points without single jumps: each replaced by the median of its neighbourhood.
-fn robust(points: &[Point]) -> Vec<Point> {
+pub(crate) fn robust(points: &[Point]) -> Vec<Point> {
     const REACH: usize = 2;
     (0..points.len())
         .map(|i| {

@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-const FLOORS: [&[&str]; 15] = [
+const FLOORS: [&[&str]; 16] = [
     &["error"],
     &["json", "math"],
     &["articulation", "vlm"],
     &["recording", "config"],
     &["twin"],
+    &["model"],
     &["hands", "synth"],
     &["localization"],
     &["geometry"],

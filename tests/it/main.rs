@@ -7,6 +7,7 @@ mod bad_input;
 mod bare_trajectories;
 mod common;
 mod floors;
+mod foreign;
 mod formats;
 mod known_truth;
 mod physics;

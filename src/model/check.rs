@@ -1,0 +1,892 @@
+//! What "simulation-ready" means, as far as a file alone can tell: the static points, numbered and named as in
+//! `tests/simulators/definition.py`, which asks the rest of every simulator.
+//!
+//! A fault is something that at least one simulator gets wrong or refuses; what is only worth knowing is told beside it.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::glb::{Places, SHARES, Scene};
+use super::{Format, Kind, Link, MassSource, Model, ModelJoint, Shape, Tree, penetration};
+use crate::articulation::JointKind;
+use crate::math::{self, Pose, Vector, unit};
+use crate::twin::{OrientedBox, Twin, mass_properties};
+
+/// What a file says to a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// It holds.
+    Pass,
+    /// It does not.
+    Fail,
+    /// The file has nothing that the point is about.
+    NotApplicable,
+}
+
+/// A point and what a file says to it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Point {
+    /// Its number in the definition.
+    pub id: u8,
+    /// Its words.
+    pub title: &'static str,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// What is wrong, each with the way out.
+    pub faults: Vec<String>,
+    /// What is worth knowing and no fault.
+    pub told: Vec<String>,
+}
+
+/// The static points.
+pub const POINTS: [(u8, &str); 9] = [
+    (1, "loads without a word"),
+    (2, "limits: closed at 0, positive opens, a part stays in its furniture"),
+    (3, "masses, centres, inertias of the boxes"),
+    (4, "fixed base, nothing lost"),
+    (5, "a box per board, safe names, handles"),
+    (6, "MJCF: radians, limited, excludes, visual geoms that do not collide"),
+    (7, "glTF: validator, pivots, animations, +Y up"),
+    (9, "handles closed, half, open in the same place in all files"),
+    (11, "sweep: no penetration over each range, a millimetre free when closed"),
+];
+
+/// A handle must be in the same place in all files to within this, metres.
+const PLACE_M: f64 = 1e-5;
+/// Less is a hair, not a part.
+const MIN_MASS_KG: f64 = 0.05;
+/// More is a wall.
+const MAX_MASS_KG: f64 = 200.0;
+/// A hinge that opens by less has, as a rule, radians that were read as degrees: half a turn, taken so.
+const MIN_HINGE_RAD: f64 = 0.056;
+/// Longer slides are millimetres that were taken for metres.
+const MAX_SLIDE_M: f64 = 3.0;
+const MIN_SLIDE_M: f64 = 1e-3;
+/// What a simulator's contacts forgive, metres.
+const TOUCH_M: f64 = 1e-3;
+/// What makes a part jam or jump, metres.
+const JAM_M: f64 = 5e-3;
+/// Poses over a joint's range.
+const POSES: usize = 51;
+/// Pairs of boxes over all poses, above which a sweep would take minutes.
+const MAX_PAIRS: usize = 1_000_000_000;
+
+/// Faults and remarks of one point.
+#[derive(Default)]
+struct Said {
+    concerned: bool,
+    faults: Vec<String>,
+    told: Vec<String>,
+}
+
+impl Said {
+    fn about(concerned: bool) -> Self {
+        Self { concerned, ..Self::default() }
+    }
+
+    fn fault(&mut self, text: String) {
+        self.faults.push(text);
+    }
+
+    fn tell(&mut self, text: String) {
+        self.told.push(text);
+    }
+}
+
+fn points(mut said: BTreeMap<u8, Said>) -> Vec<Point> {
+    POINTS
+        .into_iter()
+        .map(|(id, title)| {
+            let Said { concerned, faults, told } = said.remove(&id).unwrap_or_default();
+            let verdict = match (faults.is_empty(), concerned) {
+                (false, _) => Verdict::Fail,
+                (true, true) => Verdict::Pass,
+                (true, false) => Verdict::NotApplicable,
+            };
+            Point { id, title, verdict, faults, told }
+        })
+        .collect()
+}
+
+/// All points about a URDF or MJCF model; `twin` is the model that the file was written from, where there is one.
+#[must_use]
+pub fn model(model: &Model, twin: Option<&Twin>) -> Vec<Point> {
+    let (tree, broken) = match model.tree() {
+        Ok(tree) => (Some(tree), Vec::new()),
+        Err(faults) => (None, faults),
+    };
+    let mut said = BTreeMap::from([
+        (1, loads(model, broken)),
+        (2, limits(model, tree.as_ref())),
+        (3, masses(model, tree.as_ref(), twin)),
+        (5, names(model, tree.as_ref())),
+        (6, mjcf(model)),
+    ]);
+    if let Some(tree) = &tree {
+        said.insert(4, base(model, tree));
+        said.insert(11, sweep(model, tree));
+        if let Some(twin) = twin {
+            said.insert(9, same_places(twin, &places(model, tree)));
+        }
+    }
+    points(said)
+}
+
+/// All points about a glTF scene; `twin` is the model that the file was written from, where there is one.
+#[must_use]
+pub fn scene(scene: &Scene, twin: Option<&Twin>) -> Vec<Point> {
+    let mut said = BTreeMap::from([(1, Said::about(true)), (7, animations(scene, twin))]);
+    if let Some(twin) = twin {
+        said.insert(9, same_places(twin, &scene.places));
+    }
+    points(said)
+}
+
+fn loads(model: &Model, broken: Vec<String>) -> Said {
+    let mut said = Said { concerned: true, faults: broken, told: Vec::new() };
+    if let Format::Urdf { complaint: Some(complaint), .. } = &model.format {
+        said.fault(format!("urdf-rs, and whoever reads with it, refuses the file: {complaint}"));
+    }
+    said
+}
+
+/// An opening for people.
+fn amount(kind: JointKind, value: f64) -> String {
+    match kind {
+        JointKind::Revolute => format!("{value:.4} rad ({:.1}°)", value.to_degrees()),
+        JointKind::Prismatic => format!("{value:.4} m"),
+    }
+}
+
+fn limits(model: &Model, tree: Option<&Tree>) -> Said {
+    let mut said = Said::about(model.moving().next().is_some());
+    let urdf = matches!(model.format, Format::Urdf { .. });
+    for (index, joint) in model.moving() {
+        let (name, Some(kind)) = (&joint.name, joint.moves()) else { continue };
+        match (joint.lower, joint.upper) {
+            (Some(lower), Some(upper)) => {
+                range(&mut said, model, joint, kind, [lower, upper]);
+                if let Some(tree) = tree.filter(|_| kind == JointKind::Prismatic && lower < upper) {
+                    falls_out(&mut said, model, tree, index, upper - lower);
+                }
+            }
+            _ if urdf => said.fault(format!(
+                "{name}: no limits; write <limit lower=\"0\" upper=\"...\" effort=\"...\" velocity=\"...\"/>, and not continuous"
+            )),
+            _ => said.fault(format!("{name}: no limits; write limited=\"true\" range=\"0 ...\"")),
+        }
+        let length = joint.axis.norm();
+        if length < 1e-9 {
+            said.fault(format!("{name}: its axis is 0; give it a direction"));
+        } else if urdf && (length - 1.0).abs() > 1e-3 {
+            // MuJoCo makes axes unit vectors itself.
+            said.fault(format!("{name}: its axis has length {length:.4}; some readers do not make it 1"));
+        }
+        let values = [
+            ("effort", joint.effort, urdf),
+            ("velocity", joint.velocity, urdf),
+            ("damping", joint.damping, true),
+            (if urdf { "friction" } else { "frictionloss" }, joint.friction, true),
+        ];
+        for (what, value, wanted) in values {
+            match value {
+                None if wanted => said.fault(format!("{name}: no {what}; write a positive one")),
+                Some(v) if v <= 0.0 => said.fault(format!("{name}: {what} is {v}; write a positive one")),
+                _ => {}
+            }
+        }
+    }
+    said
+}
+
+fn range(said: &mut Said, model: &Model, joint: &ModelJoint, kind: JointKind, [lower, upper]: [f64; 2]) {
+    let name = &joint.name;
+    if lower > upper {
+        said.fault(format!("{name}: lower limit {lower} is above upper limit {upper}; swap them"));
+        return;
+    }
+    if lower == upper {
+        said.fault(format!("{name}: limits {lower} to {upper} lock it; widen them, or make it fixed"));
+        return;
+    }
+    if !(lower..=upper).contains(&0.0) {
+        said.fault(format!(
+            "{name}: 0, where every simulator begins, is outside its limits {lower} to {upper}; move the joint's frame \
+             so that closed is 0"
+        ));
+    } else if lower != 0.0 {
+        said.tell(format!(
+            "{name}: lower limit {lower}: 0 is not its lower end; closed is taken to be the end nearest to 0"
+        ));
+    }
+    let opens = upper - lower;
+    let text = amount(kind, opens);
+    match kind {
+        JointKind::Revolute if opens > std::f64::consts::TAU => {
+            said.fault(format!("{name}: turns by {text}, more than once around; limits must be radians here"));
+        }
+        JointKind::Revolute if opens > std::f64::consts::PI + 1e-6 => {
+            said.tell(format!("{name}: turns by {text}, farther than doors do"));
+        }
+        JointKind::Revolute if opens < MIN_HINGE_RAD => {
+            let way_out = match model.format {
+                Format::Mjcf { radian: false } => {
+                    "this file's angles are degrees; if radians are meant write <compiler angle=\"radian\"/>"
+                }
+                _ => "limits are radians here",
+            };
+            said.fault(format!("{name}: turns by only {text}; {way_out}"));
+        }
+        JointKind::Prismatic if opens > MAX_SLIDE_M => {
+            said.fault(format!("{name}: slides by {text}; limits are metres here"));
+        }
+        JointKind::Prismatic if opens < MIN_SLIDE_M => {
+            said.fault(format!("{name}: slides by only {text}; limits are metres here"));
+        }
+        _ => {}
+    }
+}
+
+/// Tells of a slide that goes farther than its part and its furniture are deep.
+fn falls_out(said: &mut Said, model: &Model, tree: &Tree, joint: usize, travel: f64) {
+    let poses = model.poses(tree, &model.closed());
+    let child = tree.carrier.iter().position(|c| *c == Some(joint));
+    let Some((child, parent)) = child.and_then(|c| tree.parent[c].map(|p| (c, p))) else { return };
+    let Some(axis) = unit(&model.joints[joint].axis).map(|a| poses[child].rotation * a) else { return };
+    let depth = |link: usize| {
+        let ends = model
+            .links
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| tree.body[*i] == tree.body[link])
+            .flat_map(|(i, l)| {
+                l.shapes
+                    .iter()
+                    .flat_map(|s| s.bounds.corners())
+                    .map(|p| (poses[i] * p).coords.dot(&axis))
+                    .collect::<Vec<_>>()
+            })
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
+        ends[1] - ends[0]
+    };
+    let deepest = depth(child).max(depth(parent));
+    if deepest.is_finite() && travel > deepest + 1e-6 {
+        said.tell(format!(
+            "{}: slides by {travel:.3} m, its part and its furniture are {deepest:.3} m deep",
+            model.joints[joint].name
+        ));
+    }
+}
+
+fn masses(model: &Model, tree: Option<&Tree>, twin: Option<&Twin>) -> Said {
+    let moving: BTreeSet<&str> = model.moving().map(|(_, j)| j.child.as_str()).collect();
+    let mut said = Said::about(false);
+    let root = tree.and_then(|t| t.order.first().copied());
+    for (i, link) in model.links.iter().enumerate() {
+        let name = &link.name;
+        let bare = link.shapes.is_empty() && link.meshes.is_empty();
+        let frame_only = bare && link.mass_source == MassSource::Nothing && !moving.contains(name.as_str());
+        // What stands in the world and never moves needs no mass; a link of the world's name is no body.
+        if link.between || frame_only || (Some(i) == root && name == super::mjcf::WORLD) {
+            continue;
+        }
+        said.concerned = true;
+        match (link.mass_source, link.mass) {
+            (MassSource::Nothing, _) => said.fault(format!("{name}: no <inertial>; write mass, centre and inertia")),
+            (MassSource::Assumed, _) => said.fault(format!(
+                "{name}: neither <inertial>, mass nor density is written; MuJoCo takes it to be as heavy as water"
+            )),
+            (MassSource::Stated, None) => said.fault(format!("{name}: its <inertial> has no mass")),
+            (MassSource::Shapes, None) => {
+                said.tell(format!("{name}: its mass comes from a mesh and is not worked out here"));
+            }
+            (MassSource::Stated | MassSource::Shapes, Some(mass)) => mass_of(&mut said, link, mass),
+        }
+    }
+    if let Some(twin) = twin {
+        let bodies = twin.furniture.iter().flat_map(|f| {
+            [(f.name.clone(), f.carcass.as_slice()), (format!("{}_link", f.part.id), f.part.solids.as_slice())]
+        });
+        for (name, solids) in bodies {
+            let Some(wanted) = mass_properties(solids, twin.density_kg_per_m3) else { continue };
+            let have = model.links.iter().find(|l| l.name == name).and_then(|l| l.mass);
+            // Density times volume to a thousandth.
+            if !have.is_some_and(|m| (m - wanted.mass).abs() <= 1e-3 * wanted.mass) {
+                let have = have.map_or_else(|| "none".to_owned(), |m| format!("{m:.4} kg"));
+                said.fault(format!("{name}: mass {have}; density times volume is {:.4} kg", wanted.mass));
+            }
+        }
+    }
+    said
+}
+
+fn mass_of(said: &mut Said, link: &Link, mass: f64) {
+    let name = &link.name;
+    if !(MIN_MASS_KG..=MAX_MASS_KG).contains(&mass) {
+        said.fault(format!("{name}: {mass} kg; furniture's parts weigh {MIN_MASS_KG} to {MAX_MASS_KG} kg"));
+    }
+    // Above every body, and where eigenvalues are no numbers any more.
+    const MAX_MOMENT: f64 = 1e9;
+    if !link.inertia.iter().all(|x| x.abs() < MAX_MOMENT) {
+        said.fault(format!("{name}: its moments of inertia are beyond any body's"));
+        return;
+    }
+    let mut moments: Vec<f64> = link.inertia.symmetric_eigenvalues().iter().copied().collect();
+    moments.sort_by(f64::total_cmp);
+    let told: Vec<String> = moments.iter().map(|m| format!("{m:.3e}")).collect();
+    let told = told.join(", ");
+    if let [a, b, c] = moments[..] {
+        if a <= 0.0 {
+            said.fault(format!("{name}: moments of inertia {told} kg m^2 must be positive"));
+        } else if a + b < c * (1.0 - 1e-9) {
+            said.fault(format!(
+                "{name}: no body has moments of inertia {told} kg m^2: none may exceed the sum of the others; work the \
+                 tensor out again"
+            ));
+        }
+    }
+    if link.shapes.is_empty() || link.incomplete {
+        return;
+    }
+    let corners: Vec<Vector> = link.shapes.iter().flat_map(|s| s.bounds.corners()).map(|p| p.coords).collect();
+    let (mut low, mut high) = (corners[0], corners[0]);
+    for c in &corners {
+        (low, high) = (low.inf(c), high.sup(c));
+    }
+    let outside = (0..3).map(|k| (low[k] - link.center[k]).max(link.center[k] - high[k])).fold(0.0, f64::max);
+    if outside > 1e-6 {
+        said.fault(format!("{name}: its centre of mass lies {:.1} mm outside its boxes", 1000.0 * outside));
+    }
+}
+
+fn base(model: &Model, tree: &Tree) -> Said {
+    let mut said = Said::about(true);
+    if let (Format::Urdf { keeps_links, .. }, Some(root)) = (&model.format, tree.order.first()) {
+        let root = &model.links[*root].name;
+        if root != super::mjcf::WORLD {
+            said.fault(format!(
+                "nothing holds {root}: Drake and others let it fall; add <link name=\"world\"/> and a fixed joint from it to {root}"
+            ));
+        }
+        if !keeps_links {
+            said.fault(
+                "MuJoCo melts fixed links into the world and drops visuals; add <mujoco><compiler fusestatic=\"false\" \
+                 discardvisual=\"false\"/></mujoco>"
+                    .to_owned(),
+            );
+        }
+    }
+    let mut loose = BTreeSet::new();
+    for (index, _) in model.moving() {
+        let mut link = tree.carrier.iter().position(|c| *c == Some(index));
+        while let Some(i) = link {
+            if let Some(carrier) = tree.carrier[i].filter(|c| model.joints[*c].kind == Kind::Free) {
+                loose.insert(model.joints[carrier].child.as_str());
+            }
+            link = tree.parent[i];
+        }
+    }
+    for name in loose {
+        said.fault(format!("{name} carries moving parts and floats: take its free joint away, or fix it"));
+    }
+    said
+}
+
+/// A few of many, for a message.
+fn some(names: &BTreeSet<String>) -> String {
+    let shown: Vec<String> = names.iter().take(5).map(|n| format!("\"{}\"", super::xml::brief(n))).collect();
+    let more = names.len().saturating_sub(shown.len());
+    if more == 0 { shown.join(", ") } else { format!("{} and {more} more", shown.join(", ")) }
+}
+
+fn names(model: &Model, tree: Option<&Tree>) -> Said {
+    let mut said = Said::about(true);
+    let urdf = matches!(model.format, Format::Urdf { .. });
+    let mut all: Vec<(&str, &str)> = Vec::new();
+    all.extend(model.links.iter().map(|l| ("link", l.name.as_str())));
+    // MJCF has no fixed joints: those names are ours.
+    all.extend(model.joints.iter().filter(|j| urdf || j.kind != Kind::Fixed).map(|j| ("joint", j.name.as_str())));
+    for link in &model.links {
+        let kind = |s: &Shape| {
+            if !urdf {
+                "geom"
+            } else if s.visual {
+                "visual"
+            } else {
+                "collision"
+            }
+        };
+        all.extend(link.shapes.iter().filter_map(|s| s.name.as_deref().map(|n| (kind(s), n))));
+        all.extend(link.sites.iter().map(|(n, _)| ("site", n.as_str())).filter(|(_, n)| !n.is_empty()));
+    }
+    let safe = |n: &str| !n.is_empty() && n.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    let unsafe_names: BTreeSet<String> = all.iter().filter(|(_, n)| !safe(n)).map(|(_, n)| (*n).to_owned()).collect();
+    if !unsafe_names.is_empty() {
+        said.fault(format!("{}: only letters, digits and _ are safe in names everywhere", some(&unsafe_names)));
+    }
+    let (mut seen, mut kinds) = (BTreeSet::new(), BTreeMap::<&str, BTreeSet<&str>>::new());
+    let (mut twice, mut shared) = (BTreeSet::new(), BTreeSet::new());
+    for (kind, name) in all {
+        if !seen.insert((kind, name)) {
+            twice.insert(format!("{kind} {name}"));
+        }
+        kinds.entry(name).or_default().insert(kind);
+    }
+    for (name, kinds) in &kinds {
+        // A visual may be called as the collision that it shows.
+        if kinds.len() > 1 && !kinds.iter().all(|k| ["visual", "collision"].contains(k)) {
+            shared.insert((*name).to_owned());
+        }
+    }
+    if !twice.is_empty() {
+        said.fault(format!("{}: used more than once; names must be unique", some(&twice)));
+    }
+    if !shared.is_empty() {
+        said.tell(format!(
+            "{}: named alike though of different kinds; converters that have one list rename them",
+            some(&shared)
+        ));
+    }
+    for link in model.links.iter().filter(|l| l.collides_as_mesh) {
+        said.tell(format!(
+            "{}: collides as a mesh, that is as the mesh's convex hull in most simulators; a hollow part needs a box per board",
+            link.name
+        ));
+    }
+    let Some(tree) = tree else { return said };
+    for (index, joint) in model.moving() {
+        let Some(child) = tree.carrier.iter().position(|c| *c == Some(index)) else { continue };
+        if !model.links[child].between && handle(model, tree, child).is_none() {
+            said.fault(format!(
+                "{}: no handle; name a link, geom or site of the part so that \"handle\" is in its name",
+                joint.name
+            ));
+        }
+    }
+    said
+}
+
+/// Where the handle of the rigid body around a link is, in the frame of the link that it belongs to: a site before a
+/// shape before a link, of whose name "handle" is a part.
+pub(super) fn handle(model: &Model, tree: &Tree, link: usize) -> Option<(usize, math::Point)> {
+    let is = |name: &str| name.to_ascii_lowercase().contains("handle");
+    let body: Vec<usize> = (0..model.links.len()).filter(|i| tree.body[*i] == tree.body[link]).collect();
+    let site = |i: &usize| model.links[*i].sites.iter().find(|(n, _)| is(n)).map(|(_, p)| (*i, *p));
+    let shapes = |i: &usize, named: bool| {
+        let found: Vec<math::Point> = model.links[*i]
+            .shapes
+            .iter()
+            .filter(|s| !named || s.name.as_deref().is_some_and(is))
+            .map(|s| s.bounds.center)
+            .collect();
+        math::centroid(&found).map(|p| (*i, p))
+    };
+    // A handle of several boxes is held by the one that says bar, else at their middle.
+    let bar = |i: &usize| {
+        let name = |s: &&Shape| s.name.as_deref().is_some_and(|n| is(n) && n.to_ascii_lowercase().contains("bar"));
+        model.links[*i].shapes.iter().find(name).map(|s| (*i, s.bounds.center))
+    };
+    let of_link =
+        |i: &usize| is(&model.links[*i].name).then(|| shapes(i, false).unwrap_or((*i, math::Point::origin())));
+    let named = |i: &usize| shapes(i, true);
+    body.iter()
+        .find_map(site)
+        .or_else(|| body.iter().find_map(bar))
+        .or_else(|| body.iter().find_map(named))
+        .or_else(|| body.iter().find_map(of_link))
+}
+
+fn mjcf(model: &Model) -> Said {
+    let Format::Mjcf { radian } = model.format else { return Said::default() };
+    let mut said = Said::about(true);
+    if !radian {
+        said.fault(
+            "angles are degrees; write radians and <compiler angle=\"radian\"/>: one setting holds for all files that \
+             include each other"
+                .to_owned(),
+        );
+    }
+    for (_, joint) in model.moving() {
+        if joint.limits().is_some() && joint.limited != Some(true) {
+            said.fault(format!(
+                "{}: its limits hang on autolimits, which PyBullet does not know; write limited=\"true\"",
+                joint.name
+            ));
+        }
+    }
+    said
+}
+
+fn animations(scene: &Scene, twin: Option<&Twin>) -> Said {
+    let mut said = Said::about(true);
+    if !scene.required.is_empty() {
+        said.fault(format!("needs extensions that many readers do not have: {}", scene.required.join(", ")));
+    }
+    if scene.moved.is_empty() && twin.is_none() {
+        said.tell("nothing in it is animated".to_owned());
+    }
+    for moved in &scene.moved {
+        let name = &moved.name;
+        if !moved.is_pivot {
+            said.fault(format!(
+                "{name}: is animated and carries nothing; animate a node at the hinge with the part below it"
+            ));
+        }
+        if let Some(upper) = moved.upper
+            && (moved.reaches - upper).abs() > 1e-3
+        {
+            said.fault(format!("{name}: its animation opens to {:.4}, its limit is {upper:.4}", moved.reaches));
+        }
+    }
+    for part in twin.iter().flat_map(|t| &t.furniture).map(|f| &f.part) {
+        match scene.moved.iter().find(|m| m.name == part.id) {
+            None => said.fault(format!("{}: has no animation", part.id)),
+            Some(m) if (m.reaches - part.joint.upper).abs() > 1e-3 => {
+                said.fault(format!(
+                    "{}: its animation opens to {:.4}, the model to {:.4}",
+                    part.id, m.reaches, part.joint.upper
+                ));
+            }
+            Some(_) => {}
+        }
+    }
+    said
+}
+
+/// Where links, named shapes and sites of each moving part are; every other joint is closed. World, metres.
+#[must_use]
+pub fn places(model: &Model, tree: &Tree) -> BTreeMap<String, Places> {
+    let closed = model.closed();
+    let mut out = BTreeMap::new();
+    for (index, joint) in model.moving() {
+        let beyond = tree.beyond(index);
+        let [shut, open] = joint.closed_and_open();
+        for (k, share) in SHARES.into_iter().enumerate() {
+            let mut positions = closed.clone();
+            positions[index] = shut + (open - shut) * share;
+            let poses = model.poses(tree, &positions);
+            for (i, link) in model.links.iter().enumerate().filter(|(i, _)| beyond[*i]) {
+                let shapes = link.shapes.iter().filter_map(|s| s.name.as_ref().map(|n| (n, s.bounds.center)));
+                let sites = link.sites.iter().map(|(n, p)| (n, *p));
+                for (name, p) in [(&link.name, math::Point::origin())].into_iter().chain(shapes).chain(sites) {
+                    out.entry(name.clone()).or_insert([math::Point::origin(); 3])[k] = poses[i] * p;
+                }
+            }
+        }
+    }
+    out
+}
+
+fn same_places(twin: &Twin, read: &BTreeMap<String, Places>) -> Said {
+    let mut said = Said::about(!twin.furniture.is_empty());
+    for part in twin.furniture.iter().map(|f| &f.part) {
+        let joint = &part.joint;
+        let handle = format!("{}_handle", part.id);
+        let solids = part.solids.iter().map(|s| (s.name.as_str(), s.shape.center));
+        let wanted = [(handle.as_str(), part.handle)].into_iter().chain(solids);
+        let (mut found, mut worst) = (false, (0.0f64, String::new()));
+        for (name, closed) in wanted {
+            let Some(have) = read.get(name) else { continue };
+            found = true;
+            for (share, p) in SHARES.into_iter().zip(have) {
+                let off = (joint.articulation.motion(share * joint.upper) * closed - p).norm();
+                // What is not a number is off too.
+                if off > worst.0 || off.is_nan() {
+                    worst = (off, format!("{name} at {share} of its range"));
+                }
+            }
+        }
+        if !found {
+            said.fault(format!("{}: neither its handle nor any of its boxes is in the file", part.id));
+        } else if worst.0 > PLACE_M || worst.0.is_nan() {
+            said.fault(format!("{}: {} is {:.3} mm off", part.id, worst.1, 1000.0 * worst.0));
+        }
+    }
+    said
+}
+
+/// A box that touches, where it is when everything is closed.
+struct Solid<'a> {
+    link: usize,
+    shape: &'a Shape,
+    world: OrientedBox,
+    /// Of the sphere around it.
+    radius: f64,
+}
+
+/// What a joint's sweep found.
+#[derive(Default)]
+struct Swept {
+    /// Pairs of links that share space when closed: depth in metres, indices of boxes.
+    closed: BTreeMap<(usize, usize), (f64, usize, usize)>,
+    /// Deepest pair of boxes on the way, with the share of the range.
+    deepest: Option<(f64, f64, usize, usize)>,
+    /// The same where one of the two is no box: the boxes around them overlap, they need not.
+    perhaps: Option<(f64, f64, usize, usize)>,
+}
+
+fn sweep(model: &Model, tree: &Tree) -> Said {
+    let poses = model.poses(tree, &model.closed());
+    let solids: Vec<Solid> = model
+        .links
+        .iter()
+        .enumerate()
+        .flat_map(|(link, l)| l.shapes.iter().filter(|s| !s.visual).map(move |shape| (link, shape)))
+        .map(|(link, shape)| Solid {
+            link,
+            shape,
+            world: shape.bounds.moved(&poses[link]),
+            radius: shape.bounds.half.norm(),
+        })
+        .collect();
+    // A joint without sound limits has no range to sweep: point 2 says so.
+    let sound = |j: &ModelJoint| {
+        let most = if j.kind == Kind::Prismatic { MAX_SLIDE_M } else { std::f64::consts::TAU };
+        j.limits().is_some_and(|[lower, upper]| upper - lower <= most)
+    };
+    let joints: Vec<usize> = model.moving().filter(|(_, j)| sound(j)).map(|(i, _)| i).collect();
+    let mut said = Said::about(!joints.is_empty() && !solids.is_empty());
+    let work = joints.len().saturating_mul(solids.len()).saturating_mul(solids.len() / 4 + 1).saturating_mul(POSES);
+    if work > MAX_PAIRS {
+        said.concerned = false;
+        said.tell(format!("{} joints and {} boxes are too many to sweep", joints.len(), solids.len()));
+        return said;
+    }
+    let swept: Vec<Swept> = joints.par_iter().map(|j| sweep_joint(model, tree, &poses, &solids, *j)).collect();
+    let label = |i: usize| {
+        let link = &model.links[solids[i].link].name;
+        match &solids[i].shape.name {
+            Some(name) if name != link => format!("{name} ({link})"),
+            _ => link.clone(),
+        }
+    };
+    let mm = |depth: f64| format!("{:.1} mm", 1000.0 * depth);
+    let way_out = match model.format {
+        Format::Urdf { .. } => "URDF cannot switch a contact off: leave a gap of 1 mm",
+        Format::Mjcf { .. } => "leave a gap of 1 mm, or <exclude> the pair",
+    };
+    // Two joints of one piece of furniture see the same pair.
+    let mut reported = BTreeSet::new();
+    for (joint, result) in joints.iter().zip(swept) {
+        let name = &model.joints[*joint].name;
+        for (pair, (depth, a, b)) in &result.closed {
+            let text = format!("{} and {} share {} when closed", label(*a), label(*b), mm(*depth));
+            if !reported.insert(*pair) {
+                continue;
+            }
+            if *depth > TOUCH_M && !filtered(model, tree, *pair) {
+                said.fault(format!("{name}: {text}, and push each other apart; {way_out}"));
+            } else {
+                said.tell(format!("{name}: {text}"));
+            }
+        }
+        if let Some((depth, share, a, b)) = result.deepest {
+            let pair = (solids[a].link, solids[b].link);
+            let known = result.closed.get(&pair).is_some_and(|(closed, ..)| depth <= closed + TOUCH_M);
+            let text = format!("{name}: {} goes {} into {} at {share:.2} of its range", label(a), mm(depth), label(b));
+            if depth > JAM_M {
+                said.fault(format!("{text}; move one of the two, or limit the range"));
+            } else if depth > TOUCH_M && !known {
+                said.tell(text);
+            }
+        }
+        if let Some((depth, share, a, b)) = result.perhaps.filter(|p| p.0 > JAM_M) {
+            said.tell(format!(
+                "{name}: the boxes around {} and {} overlap by {} at {share:.2} of its range; look at the shapes in them",
+                label(a),
+                label(b),
+                mm(depth)
+            ));
+        }
+    }
+    said
+}
+
+/// Whether the file has the contact between two links switched off: excluded, or, in MuJoCo, parent and child of which
+/// neither is fixed to the world.
+fn filtered(model: &Model, tree: &Tree, (a, b): (usize, usize)) -> bool {
+    let (name_a, name_b) = (&model.links[a].name, &model.links[b].name);
+    let excluded = model.excludes.iter().any(|[x, y]| (x == name_a && y == name_b) || (x == name_b && y == name_a));
+    let (body_a, body_b) = (tree.body[a], tree.body[b]);
+    let ground = tree.order.first().map(|root| tree.body[*root]);
+    let above = |body: usize| tree.parent[body].map(|p| tree.body[p]);
+    let family = above(body_a) == Some(body_b) || above(body_b) == Some(body_a);
+    let free = Some(body_a) != ground && Some(body_b) != ground;
+    excluded || (matches!(model.format, Format::Mjcf { .. }) && family && free)
+}
+
+fn sweep_joint(model: &Model, tree: &Tree, poses: &[Pose], solids: &[Solid], index: usize) -> Swept {
+    let mut out = Swept::default();
+    let joint = &model.joints[index];
+    let beyond = tree.beyond(index);
+    let child = tree.carrier.iter().position(|c| *c == Some(index));
+    let Some(parent) = child.and_then(|c| tree.parent[c]) else { return out };
+    let (moving, still): (Vec<usize>, Vec<usize>) = (0..solids.len()).partition(|i| beyond[solids[*i].link]);
+    let [shut, open] = joint.closed_and_open();
+    let foot = poses[parent] * joint.parent_from_child;
+    let back = joint.motion(shut).inverse() * foot.inverse();
+    for pose in 0..POSES {
+        let share = pose as f64 / (POSES - 1) as f64;
+        let motion = foot * joint.motion(shut + (open - shut) * share) * back;
+        for &a in &moving {
+            let moved = solids[a].world.moved(&motion);
+            for &b in &still {
+                let other = &solids[b];
+                let near = (moved.center - other.world.center).norm() < solids[a].radius + other.radius;
+                if !near || !solids[a].shape.meets(other.shape) {
+                    continue;
+                }
+                let depth = penetration(&moved, &other.world);
+                // A tenth of a millimetre is contact, not shared space.
+                if depth < 1e-4 {
+                    continue;
+                }
+                let exact = solids[a].shape.exact && other.shape.exact;
+                let slot = if exact { &mut out.deepest } else { &mut out.perhaps };
+                if slot.is_none_or(|(deepest, ..)| depth > deepest) {
+                    *slot = Some((depth, share, a, b));
+                }
+                if pose == 0 && exact {
+                    let pair = out.closed.entry((solids[a].link, other.link)).or_insert((depth, a, b));
+                    if depth > pair.0 {
+                        *pair = (depth, a, b);
+                    }
+                }
+            }
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use nalgebra::Matrix3;
+
+    use super::*;
+
+    fn cabinet() -> Model {
+        let link = |name: &str, center: Vector, half: Vector, shape: &str| Link {
+            name: name.to_owned(),
+            mass: Some(4.0),
+            mass_source: MassSource::Stated,
+            center: center.into(),
+            inertia: Matrix3::identity() * 0.1,
+            shapes: vec![Shape {
+                name: Some(shape.to_owned()),
+                bounds: OrientedBox { center: center.into(), half, rotation: Matrix3::identity() },
+                exact: true,
+                visual: false,
+                masks: [1, 1],
+            }],
+            meshes: Vec::new(),
+            collides_as_mesh: false,
+            incomplete: false,
+            sites: Vec::new(),
+            between: false,
+        };
+        let world = Link {
+            shapes: Vec::new(),
+            mass_source: MassSource::Nothing,
+            mass: None,
+            ..link("world", Vector::zeros(), Vector::zeros(), "")
+        };
+        let joint = |name: &str, kind: Kind, parent: &str, child: &str| ModelJoint {
+            name: name.to_owned(),
+            kind,
+            parent: parent.to_owned(),
+            child: child.to_owned(),
+            parent_from_child: Pose::identity(),
+            axis: Vector::z(),
+            anchor: math::Point::new(-0.3, 0.0, 0.0),
+            lower: Some(0.0),
+            upper: Some(1.5),
+            effort: Some(50.0),
+            velocity: Some(6.0),
+            damping: Some(0.5),
+            friction: Some(0.2),
+            armature: None,
+            limited: Some(true),
+        };
+        Model {
+            name: "c".to_owned(),
+            source: PathBuf::from("c.urdf"),
+            format: Format::Urdf { keeps_links: true, complaint: None },
+            links: vec![
+                world,
+                // A board behind a door that opens towards -y, about its left edge.
+                link("base", Vector::new(0.0, 0.3, 0.0), Vector::new(0.3, 0.25, 0.4), "board"),
+                link("door_link", Vector::zeros(), Vector::new(0.3, 0.01, 0.4), "door_handle"),
+            ],
+            joints: vec![
+                joint("fix", Kind::Fixed, "world", "base"),
+                ModelJoint { axis: -Vector::z(), ..joint("door", Kind::Revolute, "base", "door_link") },
+            ],
+            excludes: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+
+    fn faults(model: &Model) -> Vec<(u8, String)> {
+        super::model(model, None).into_iter().flat_map(|p| p.faults.into_iter().map(move |f| (p.id, f))).collect()
+    }
+
+    #[test]
+    fn a_sound_cabinet_passes() {
+        let points = super::model(&cabinet(), None);
+        assert!(faults(&cabinet()).is_empty(), "{:?}", faults(&cabinet()));
+        let verdicts: Vec<(u8, Verdict)> = points.iter().map(|p| (p.id, p.verdict)).collect();
+        assert_eq!(verdicts[..2], [(1, Verdict::Pass), (2, Verdict::Pass)]);
+        assert!(verdicts.contains(&(6, Verdict::NotApplicable)) && verdicts.contains(&(11, Verdict::Pass)));
+    }
+
+    #[test]
+    fn each_fault_fails_its_point_alone() {
+        type Break = fn(&mut Model);
+        let cases: [(u8, &str, Break); 9] = [
+            (2, "lower limit 2 is above", |m| m.joints[1].lower = Some(2.0)),
+            (2, "0, where every simulator begins", |m| m.joints[1].lower = Some(0.5)),
+            (2, "more than once around", |m| m.joints[1].upper = Some(110.0)),
+            (2, "axis has length 2", |m| m.joints[1].axis *= 2.0),
+            (3, "no <inertial>", |m| m.links[2].mass_source = MassSource::Nothing),
+            (3, "must be positive", |m| m.links[2].inertia = Matrix3::zeros()),
+            (3, "none may exceed", |m| m.links[2].inertia[(0, 0)] = 9.0),
+            (3, "50.0 mm outside", |m| m.links[2].center.x = 0.35),
+            (5, "no handle", |m| m.links[2].shapes[0].name = None),
+        ];
+        for (id, word, break_it) in cases {
+            let mut broken = cabinet();
+            break_it(&mut broken);
+            let found = faults(&broken);
+            assert!(
+                found.iter().all(|(i, _)| *i == id) && found.iter().any(|(_, f)| f.contains(word)),
+                "{word}: {found:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn overlap_when_closed_is_told_from_excluded_overlap_and_from_a_jam() {
+        let mut tight = cabinet();
+        tight.links[1].shapes[0].bounds.center.y = 0.258;
+        let found = faults(&tight);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(found[0].0 == 11 && found[0].1.contains("share 2.0 mm when closed"), "{found:?}");
+        tight.format = Format::Mjcf { radian: true };
+        tight.excludes.push(["door_link".to_owned(), "base".to_owned()]);
+        assert!(faults(&tight).is_empty(), "{:?}", faults(&tight));
+        // The other way round it opens into the board.
+        let mut jams = cabinet();
+        jams.joints[1].axis = Vector::z();
+        let found = faults(&jams);
+        assert!(found.iter().all(|(id, f)| *id == 11 && f.contains("door_handle (door_link) goes")), "{found:?}");
+        assert!(!found.is_empty());
+        // Shapes that never meet may share what they like.
+        jams.links[1].shapes[0].masks = [0, 0];
+        assert!(faults(&jams).is_empty(), "{:?}", faults(&jams));
+    }
+}

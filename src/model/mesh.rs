@@ -1,0 +1,117 @@
+//! Boxes around meshes: their vertices are all that is read.
+
+use std::path::{Path, PathBuf};
+
+use super::xml;
+use crate::math::{Point, Vector};
+
+/// Where a mesh lies: beside the model, below one of `folders`, or, for `package://name/...`, below a folder above the
+/// model that has or is that package. `None` where there is no such file.
+pub(super) fn find(model: &Path, folders: &[PathBuf], file: &str) -> Option<PathBuf> {
+    let dir = model.parent().unwrap_or(Path::new(""));
+    let file = file.strip_prefix("file://").unwrap_or(file);
+    let candidates: Vec<PathBuf> = match file.strip_prefix("package://").or_else(|| file.strip_prefix("model://")) {
+        Some(inside) => {
+            let (package, rest) = inside.split_once('/')?;
+            let absolute = std::path::absolute(dir).ok()?;
+            absolute
+                .ancestors()
+                .flat_map(|above| {
+                    let is_it = above.file_name().is_some_and(|n| n.to_str() == Some(package));
+                    is_it.then(|| above.join(rest)).into_iter().chain([above.join(inside)])
+                })
+                .collect()
+        }
+        None => folders.iter().map(|f| dir.join(f).join(file)).chain([dir.join(file)]).collect(),
+    };
+    candidates.into_iter().find(|c| c.is_file())
+}
+
+/// Lowest and highest corner of an OBJ or STL file's vertices; `Err` says why there are none.
+pub(super) fn bounds(path: &Path) -> Result<[Point; 2], String> {
+    let bytes = xml::read_bytes(path, xml::MAX_BYTES).map_err(|e| e.to_string())?;
+    let kind = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let mut low = Vector::repeat(f64::INFINITY);
+    let mut high = Vector::repeat(f64::NEG_INFINITY);
+    let mut add = |p: [f64; 3]| {
+        low = low.inf(&Vector::from(p));
+        high = high.sup(&Vector::from(p));
+    };
+    match kind.as_str() {
+        "obj" => text_vertices(&bytes, "v", &mut add),
+        "stl" => match binary_triangles(&bytes) {
+            Some(triangles) => {
+                for corner in triangles.chunks_exact(TRIANGLE).flat_map(|t| t[12..48].chunks_exact(12)) {
+                    let coordinate = |k: usize| {
+                        let four = corner.get(4 * k..4 * k + 4).and_then(|b| b.try_into().ok()).unwrap_or([0; 4]);
+                        f64::from(f32::from_le_bytes(four))
+                    };
+                    add([coordinate(0), coordinate(1), coordinate(2)]);
+                }
+            }
+            None => text_vertices(&bytes, "vertex", &mut add),
+        },
+        other => return Err(format!("the format \"{}\" is not read (OBJ and STL are)", xml::brief(other))),
+    }
+    let finite = low.iter().chain(high.iter()).all(|x| x.is_finite());
+    if finite {
+        Ok([Point::from(low), Point::from(high)])
+    } else {
+        Err("it has no vertices, or some that are not finite".to_owned())
+    }
+}
+
+/// Bytes of a triangle of a binary STL: a normal, three corners, two bytes more.
+const TRIANGLE: usize = 50;
+
+/// The triangles of a binary STL, told from text by its length.
+fn binary_triangles(bytes: &[u8]) -> Option<&[u8]> {
+    let count = u32::from_le_bytes(bytes.get(80..84)?.try_into().ok()?) as usize;
+    let rest = &bytes[84..];
+    (rest.len() == count.checked_mul(TRIANGLE)?).then_some(rest)
+}
+
+/// Three numbers behind a word at the beginning of a line.
+fn text_vertices(bytes: &[u8], word: &str, add: &mut impl FnMut([f64; 3])) {
+    for line in bytes.split(|b| *b == b'\n') {
+        let Ok(line) = std::str::from_utf8(line) else { continue };
+        let mut words = line.split_ascii_whitespace();
+        if words.next() != Some(word) {
+            continue;
+        }
+        let mut coordinate = || words.next().and_then(|w| w.parse::<f64>().ok()).unwrap_or(f64::NAN);
+        add([coordinate(), coordinate(), coordinate()]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mesh_has_the_same_bounds_in_every_format() {
+        let dir = tempfile::tempdir().unwrap();
+        let corners = [[0.0, 0.0, 1.0], [2.0, 0.0, 1.0], [0.0, -3.0, 1.5f32]];
+        let obj: String = corners.iter().map(|c| format!("v {} {} {}\n", c[0], c[1], c[2])).collect();
+        let ascii: String = corners.iter().map(|c| format!("  vertex {} {} {}\n", c[0], c[1], c[2])).collect();
+        let mut binary = vec![0u8; 80];
+        binary.extend(1u32.to_le_bytes());
+        binary.extend([0u8; 12]);
+        binary.extend(corners.iter().flatten().flat_map(|x| x.to_le_bytes()));
+        binary.extend([0u8; 2]);
+        for (name, bytes) in [("a.obj", obj.into_bytes()), ("a.stl", ascii.into_bytes()), ("b.STL", binary)] {
+            let path = dir.path().join(name);
+            std::fs::write(&path, bytes).unwrap();
+            assert_eq!(bounds(&path).unwrap(), [Point::new(0.0, -3.0, 1.0), Point::new(2.0, 0.0, 1.5)], "{name}");
+        }
+        std::fs::write(dir.path().join("c.obj"), "v 1 2\n").unwrap();
+        assert!(bounds(&dir.path().join("c.obj")).is_err());
+        assert!(bounds(&dir.path().join("c.dae")).is_err());
+        let model = dir.path().join("robots/kitchen/urdf/m.urdf");
+        std::fs::create_dir_all(dir.path().join("robots/kitchen/urdf")).unwrap();
+        std::fs::write(dir.path().join("robots/kitchen/a.obj"), "v 0 0 0\n").unwrap();
+        assert!(find(&model, &[], "package://kitchen/a.obj").is_some());
+        assert!(find(&model, &[], "package://kitchen/b.obj").is_none());
+        assert!(find(&model, &[], "../a.obj").is_some());
+    }
+}

@@ -1,0 +1,287 @@
+//! URDF. Read from the XML itself, because what is missing must stay missing: `urdf-rs` turns an absent limit into one of
+//! 0 and an absent inertia into no mass. Whether `urdf-rs` reads the file too is kept as [`Format::Urdf`]'s `complaint`.
+//!
+//! Read: links with inertia, boxes, cylinders, spheres, capsules and OBJ or STL meshes; joints with origin, axis, limit,
+//! dynamics. A `<limit>` with one of `lower` and `upper` has 0 for the other, as the format says. Listed as not read:
+//! `mimic`, `safety_controller`, `transmission`, `gazebo` and other additions.
+
+use std::path::Path;
+
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion};
+
+use super::shapes::Primitive;
+use super::xml::{self, Element};
+use super::{Format, Kind, Link, MassSource, Model, ModelJoint, Shape, bounded, mesh, named};
+use crate::error::{Error, Result};
+use crate::math::{Point, Pose, Vector};
+
+/// Reads a file.
+///
+/// # Errors
+/// Where it cannot be read, is no URDF, or holds what no model can; a file that still has xacro in it says so.
+pub fn read(path: &Path) -> Result<Model> {
+    let text = xml::read_text(path)?;
+    let root = xml::parse(path, &text)?;
+    from_element(path, &text, &root)
+}
+
+pub(super) fn from_element(path: &Path, text: &str, root: &Element) -> Result<Model> {
+    if root.name != "robot" {
+        return Err(root.error("expected <robot>, the outermost element of a URDF"));
+    }
+    if let Some(found) = xacro(root) {
+        return Err(found.error(format!(
+            "is xacro, not URDF; expand it first: xacro {} > model.urdf",
+            path.file_name().map_or_else(|| "FILE".to_owned(), |n| n.to_string_lossy().into_owned())
+        )));
+    }
+    let keeps_links = root
+        .all("mujoco")
+        .flat_map(|m| m.all("compiler"))
+        .any(|c| c.get("fusestatic") == Some("false") && c.get("discardvisual") == Some("false"));
+    let complaint = urdf_rs::read_from_string(text).err().map(|e| xml::brief(&e.to_string()));
+    let mut model = Model {
+        name: named(root.get("name"), path),
+        source: path.to_owned(),
+        format: Format::Urdf { keeps_links, complaint },
+        links: Vec::new(),
+        joints: Vec::new(),
+        excludes: Vec::new(),
+        notes: Vec::new(),
+    };
+    for child in &root.children {
+        match child.name.as_str() {
+            "link" => {
+                let link = link(path, child, &mut model.notes)?;
+                model.links.push(link);
+            }
+            "joint" => {
+                let joint = joint(child, &mut model.notes)?;
+                model.joints.push(joint);
+            }
+            "material" | "mujoco" => {}
+            other => model.notes.push(format!("<{}> (line {}) is not read", xml::brief(other), child.line)),
+        }
+    }
+    if model.links.is_empty() {
+        return Err(Error::format(path, root.label(), "holds no <link>"));
+    }
+    bounded(&model)?;
+    Ok(model)
+}
+
+/// The first element that xacro has not replaced.
+fn xacro(element: &Element) -> Option<&Element> {
+    let unexpanded = element.attributes.iter().any(|(_, value)| value.contains("${") || value.contains("$("));
+    if element.name.starts_with("xacro:") || unexpanded {
+        return Some(element);
+    }
+    element.children.iter().find_map(xacro)
+}
+
+fn pose(parent: &Element) -> Result<Pose> {
+    let Some(origin) = parent.child("origin") else { return Ok(Pose::identity()) };
+    let xyz = origin.numbers::<3>("xyz")?.unwrap_or_default();
+    let turn = match (origin.numbers::<3>("rpy")?, origin.numbers::<4>("quat_xyzw")?) {
+        (None, Some([x, y, z, w])) => {
+            UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-6).ok_or_else(|| origin.error("quat_xyzw is 0"))?
+        }
+        (rpy, _) => {
+            let [roll, pitch, yaw] = rpy.unwrap_or_default();
+            UnitQuaternion::from_euler_angles(roll, pitch, yaw)
+        }
+    };
+    Ok(Pose::from_parts(Vector::from(xyz).into(), turn))
+}
+
+fn link(path: &Path, element: &Element, notes: &mut Vec<String>) -> Result<Link> {
+    let mut link = Link {
+        name: element.own_name()?,
+        mass: None,
+        mass_source: MassSource::Nothing,
+        center: Point::origin(),
+        inertia: Matrix3::zeros(),
+        shapes: Vec::new(),
+        meshes: Vec::new(),
+        collides_as_mesh: false,
+        incomplete: false,
+        sites: Vec::new(),
+        between: false,
+    };
+    if let Some(inertial) = element.child("inertial") {
+        let place = pose(inertial)?;
+        link.mass = inertial.child("mass").map(|m| m.number("value")).transpose()?.flatten();
+        link.mass_source = MassSource::Stated;
+        link.center = place * Point::origin();
+        if let Some(i) = inertial.child("inertia") {
+            let value = |name: &str| -> Result<f64> { Ok(i.number(name)?.unwrap_or(0.0)) };
+            let (xy, xz, yz) = (value("ixy")?, value("ixz")?, value("iyz")?);
+            let own = Matrix3::new(value("ixx")?, xy, xz, xy, value("iyy")?, yz, xz, yz, value("izz")?);
+            let turn = place.rotation.to_rotation_matrix();
+            link.inertia = turn.matrix() * own * turn.matrix().transpose();
+        }
+    }
+    for child in &element.children {
+        let visual = match child.name.as_str() {
+            "visual" => true,
+            "collision" => false,
+            _ => continue,
+        };
+        let Some(geometry) = child.child("geometry") else { return Err(child.error("has no <geometry>")) };
+        let Some(solid) = geometry.children.first() else { return Err(geometry.error("is empty")) };
+        let primitive = if solid.name == "mesh" {
+            let file = solid.get("filename").ok_or_else(|| solid.error("has no filename"))?;
+            link.meshes.push(file.to_owned());
+            link.collides_as_mesh |= !visual;
+            let scale = Vector::from(solid.numbers::<3>("scale")?.unwrap_or([1.0; 3]));
+            match measured(path, file) {
+                Ok([low, high]) => {
+                    let ends = [low.coords.component_mul(&scale), high.coords.component_mul(&scale)];
+                    Primitive::Mesh([ends[0].inf(&ends[1]).into(), ends[0].sup(&ends[1]).into()])
+                }
+                Err(why) => {
+                    link.incomplete = true;
+                    notes.push(format!("{}: mesh {} is not read: {why}", link.name, xml::brief(file)));
+                    continue;
+                }
+            }
+        } else {
+            primitive(solid)?
+        };
+        link.shapes.push(Shape {
+            name: child.get("name").map(str::to_owned),
+            bounds: primitive.bounds(&pose(child)?),
+            exact: primitive.is_box(),
+            visual,
+            masks: [1, 1],
+        });
+    }
+    Ok(link)
+}
+
+fn measured(path: &Path, file: &str) -> std::result::Result<[Point; 2], String> {
+    mesh::bounds(&mesh::find(path, &[], file).ok_or("there is no such file beside the model")?)
+}
+
+fn primitive(solid: &Element) -> Result<Primitive> {
+    let positive = |name: &str| -> Result<f64> {
+        match solid.number(name)? {
+            Some(value) if value > 0.0 => Ok(value),
+            _ => Err(solid.error(format!("{name} must be there and positive"))),
+        }
+    };
+    Ok(match solid.name.as_str() {
+        "box" => match solid.numbers::<3>("size")? {
+            Some(size) if size.iter().all(|s| *s > 0.0) => Primitive::Cuboid(Vector::from(size) * 0.5),
+            _ => return Err(solid.error("size must be three positive numbers")),
+        },
+        "cylinder" => Primitive::Cylinder(positive("radius")?, 0.5 * positive("length")?),
+        "capsule" => Primitive::Capsule(positive("radius")?, 0.5 * positive("length")?),
+        "sphere" => Primitive::Sphere(positive("radius")?),
+        _ => return Err(solid.error("is no geometry of URDF (box, cylinder, sphere, capsule, mesh)")),
+    })
+}
+
+fn joint(element: &Element, notes: &mut Vec<String>) -> Result<ModelJoint> {
+    let name = element.own_name()?;
+    let kind = match element.get("type") {
+        Some("fixed") => Kind::Fixed,
+        Some("revolute") => Kind::Revolute,
+        Some("continuous") => Kind::Continuous,
+        Some("prismatic") => Kind::Prismatic,
+        Some("floating") => Kind::Free,
+        Some("planar" | "spherical" | "ball") => Kind::Other,
+        Some(other) => return Err(element.error(format!("\"{}\" is no joint type of URDF", xml::brief(other)))),
+        None => return Err(element.error("has no type")),
+    };
+    let end = |which: &str| {
+        let found = element.child(which).and_then(|e| e.get("link"));
+        found.map(str::to_owned).ok_or_else(|| element.error(format!("has no <{which} link=\"...\"/>")))
+    };
+    let of = |child: &str, attribute: &str| match element.child(child) {
+        Some(e) => e.number(attribute),
+        None => Ok(None),
+    };
+    let axis = element.child("axis").map(|a| a.numbers::<3>("xyz")).transpose()?.flatten().unwrap_or([1.0, 0.0, 0.0]);
+    let (mut lower, mut upper) = (of("limit", "lower")?, of("limit", "upper")?);
+    if kind == Kind::Continuous {
+        (lower, upper) = (None, None);
+    } else if lower.is_some() || upper.is_some() {
+        (lower, upper) = (lower.or(Some(0.0)), upper.or(Some(0.0)));
+    }
+    for extra in ["mimic", "safety_controller"] {
+        if element.child(extra).is_some() {
+            notes.push(format!("{name}: <{extra}> is not read; the joint is taken to move by itself"));
+        }
+    }
+    Ok(ModelJoint {
+        kind,
+        parent: end("parent")?,
+        child: end("child")?,
+        parent_from_child: pose(element)?,
+        axis: Vector::from(axis),
+        anchor: Point::origin(),
+        lower,
+        upper,
+        effort: of("limit", "effort")?,
+        velocity: of("limit", "velocity")?,
+        damping: of("dynamics", "damping")?,
+        friction: of("dynamics", "friction")?,
+        armature: None,
+        limited: None,
+        name,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn model(text: &str) -> std::result::Result<Model, String> {
+        let path = Path::new("m.urdf");
+        let root = xml::parse(path, text).map_err(|e| e.to_string())?;
+        from_element(path, text, &root).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn what_is_missing_stays_missing() {
+        let text = r#"<robot name="r"><link name="a"/><link name="b"><collision><geometry><box size="2 4 6"/></geometry>
+            </collision></link><joint name="j" type="revolute"><parent link="a"/><child link="b"/>
+            <limit upper="1" effort="3"/></joint></robot>"#;
+        let m = model(text).unwrap();
+        let j = &m.joints[0];
+        assert_eq!((j.lower, j.upper, j.effort, j.velocity, j.damping), (Some(0.0), Some(1.0), Some(3.0), None, None));
+        assert_eq!((m.links[1].mass, m.links[1].shapes[0].bounds.half), (None, Vector::new(1.0, 2.0, 3.0)));
+        assert!(matches!(&m.format, Format::Urdf { keeps_links: false, complaint: Some(_) }));
+    }
+
+    #[test]
+    fn inertia_is_turned_into_the_links_axes() {
+        let text = r#"<robot name="r"><link name="a"><inertial><origin xyz="1 0 0" rpy="0 0 1.5707963267948966"/>
+            <mass value="2"/><inertia ixx="1" iyy="2" izz="3" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"#;
+        let m = model(text).unwrap();
+        let i = m.links[0].inertia;
+        assert!((i - Matrix3::from_diagonal(&Vector::new(2.0, 1.0, 3.0))).norm() < 1e-12);
+        assert_eq!(m.links[0].center, Point::new(1.0, 0.0, 0.0));
+    }
+
+    #[test]
+    fn broken_files_say_where_and_what() {
+        for (text, word) in [
+            (r#"<robot xmlns:xacro="x"><xacro:macro name="m"/></robot>"#, "xacro m.urdf"),
+            (r#"<robot><link name="${prefix}a"/></robot>"#, "xacro m.urdf"),
+            (r#"<robot><joint name="j" type="hinge"/></robot>"#, "\"hinge\" is no joint type"),
+            (r#"<robot><joint name="j" type="fixed"/></robot>"#, "has no <parent"),
+            (r#"<robot><link/></robot>"#, "has no name"),
+            (r#"<robot></robot>"#, "holds no <link>"),
+            (
+                r#"<robot><link name="a"><visual><origin xyz="0 nan 0"/><geometry><sphere radius="1"/></geometry></visual>
+                </link></robot>"#,
+                "line 1, <origin>: xyz: NaN is not finite",
+            ),
+        ] {
+            let error = model(text).unwrap_err();
+            assert!(error.contains("m.urdf") && error.contains(word), "{error}");
+        }
+    }
+}
