@@ -536,7 +536,9 @@ mod tests {
                 }
                 assert!(held > 5);
                 let upper = joint["range"][1].as_f64().unwrap();
-                assert!(clip["x"].as_array().unwrap().iter().all(|x| (0.0..=upper + 1e-9).contains(&x.as_f64().unwrap())));
+                assert!(
+                    clip["x"].as_array().unwrap().iter().all(|x| (0.0..=upper + 1e-9).contains(&x.as_f64().unwrap()))
+                );
             }
             assert_eq!(truth["tier"], tier.name());
             let up = Vector::from(read(&truth["up"]));
