@@ -7,11 +7,11 @@ use clap::Args;
 use super::output::{Kind, Output};
 use super::progress::Steps;
 use super::{Answer, print, shown};
-use crate::synth::{self, Options, Tier};
+use crate::synth::{self, Changes, Options, Tier};
 
 #[derive(Debug, Args)]
 pub struct SynthArgs {
-    /// Which kitchen and which person
+    /// Which kitchen and which person; below 1000 for development, from 1000 on for reports only
     #[arg(long, default_value_t = 0)]
     seed: u64,
     /// How noisy the recording is
@@ -23,6 +23,27 @@ pub struct SynthArgs {
     /// Parts that are opened and closed
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=12))]
     parts: u32,
+    /// Clips of each part, other parts' between them (tiers t0 to nonm) [default: 2]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=20))]
+    clips_per_part: Option<u32>,
+    /// Standard deviation of hand positions in each direction, outliers apart
+    #[arg(long, value_name = "CM")]
+    hand_noise: Option<f64>,
+    /// Relative standard deviation of the hands' distance, the same for a whole clip
+    #[arg(long, value_name = "SHARE")]
+    depth_bias: Option<f64>,
+    /// Hand samples with contact that remain of each clip; all others are left out
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
+    few_hands: Option<u32>,
+    /// Share of clips whose noun is of the wrong joint type
+    #[arg(long, value_name = "SHARE")]
+    word_error: Option<f64>,
+    /// Share of clips in whose frames the mask covers a neighbouring part, too
+    #[arg(long, value_name = "SHARE")]
+    mask_error: Option<f64>,
+    /// Write no masks
+    #[arg(long)]
+    no_masks: bool,
     /// Folder for the recording
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -30,15 +51,28 @@ pub struct SynthArgs {
 
 pub fn run(args: &SynthArgs) -> anyhow::Result<Answer> {
     let options = Options { seed: args.seed, tier: args.tier, width: args.width as usize, parts: args.parts as usize };
-    write(&options, &args.out)?;
+    let changes = Changes {
+        clips_per_part: args.clips_per_part.map(|n| n as usize),
+        hand_noise_m: args.hand_noise.map(|cm| 0.01 * cm),
+        depth_bias: args.depth_bias,
+        few_hands: args.few_hands.map(|n| n as usize),
+        word_error: args.word_error,
+        mask_error: args.mask_error,
+        no_masks: args.no_masks,
+    };
+    write_varied(&options, &changes, &args.out)?;
     print(&format!("{}\n", shown(&args.out)))?;
     Ok(Answer::Yes)
 }
 
 /// Renders a recording into a folder.
 pub fn write(options: &Options, out: &Path) -> anyhow::Result<()> {
+    write_varied(options, &Changes::default(), out)
+}
+
+fn write_varied(options: &Options, changes: &Changes, out: &Path) -> anyhow::Result<()> {
     let output = Output::new(out, Kind::Recording, &[])?;
-    let recording = synth::Recorded::new(options)?;
+    let recording = synth::Recorded::varied(options, changes)?;
     for (name, text) in recording.tables()? {
         output.write(&name, text)?;
     }

@@ -29,6 +29,8 @@ pub struct Block {
 pub struct OpenPart {
     /// Name.
     pub id: String,
+    /// What it is: "drawer", "door", "sliding door", "flap", "lid", "oven", ...
+    pub kind: &'static str,
     /// The word for its furniture.
     pub noun: &'static str,
     /// Its joint; positive opens.
@@ -37,6 +39,8 @@ pub struct OpenPart {
     pub upper: f64,
     /// Where it is held, closed.
     pub handle: Point,
+    /// Along the handle's bar.
+    pub handle_along: Vector,
     /// Out of the furniture.
     pub out: Vector,
     /// Box of the part, closed, handle included.
@@ -54,23 +58,53 @@ pub struct Kitchen {
     pub fixed: Vec<Block>,
     /// What does.
     pub parts: Vec<OpenPart>,
+    /// Names of the mask classes, from class 1.
+    pub classes: &'static [&'static str],
 }
 
-const BOARD: f64 = 0.018;
-const GAP: f64 = 0.003;
-const DEPTH: f64 = 0.58;
+/// Thickness of boards and fronts.
+pub(super) const BOARD: f64 = 0.018;
+/// Free space around a front.
+pub(super) const GAP: f64 = 0.003;
+/// Depth of base furniture.
+pub(super) const DEPTH: f64 = 0.58;
+/// Body and inside of furniture.
+pub(super) const WOOD: [u8; 3] = [214, 210, 202];
+/// Trays of drawers.
+pub(super) const TRAY: [u8; 3] = [226, 222, 214];
+/// Bars of handles.
+pub(super) const HANDLE: [u8; 3] = [58, 60, 64];
+
+/// Bounds of an upright box in kitchen coordinates: low and high in x, y and z.
+pub(super) type Bounds = [[f64; 2]; 3];
 
 /// Builds in kitchen coordinates (x along the row, y out of the wall, z up) and places the result in the world.
-struct Builder {
-    world_from_kitchen: Pose,
-    fixed: Vec<Block>,
-    parts: Vec<OpenPart>,
-    front: [u8; 3],
+pub(super) struct Builder {
+    pub(super) world_from_kitchen: Pose,
+    pub(super) fixed: Vec<Block>,
+    pub(super) parts: Vec<OpenPart>,
+    pub(super) front: [u8; 3],
+}
+
+/// A part in kitchen coordinates, closed.
+pub(super) struct Moving {
+    pub(super) kind: &'static str,
+    pub(super) noun: &'static str,
+    pub(super) class: u8,
+    /// Its boxes with their colours.
+    pub(super) boxes: Vec<(Bounds, [u8; 3])>,
+    pub(super) joint: JointKind,
+    pub(super) axis: Vector,
+    pub(super) origin: Point,
+    pub(super) upper: f64,
+    pub(super) handle: Point,
+    pub(super) handle_along: Vector,
+    pub(super) base: Bounds,
 }
 
 impl Builder {
     /// A box from its bounds in kitchen coordinates.
-    fn shape(&self, bounds: [[f64; 2]; 3]) -> OrientedBox {
+    pub(super) fn shape(&self, bounds: Bounds) -> OrientedBox {
         let middle = Point::from(bounds.map(|b| 0.5 * (b[0] + b[1])));
         OrientedBox {
             center: self.world_from_kitchen * middle,
@@ -79,93 +113,48 @@ impl Builder {
         }
     }
 
-    fn block(&self, bounds: [[f64; 2]; 3], color: [u8; 3], class: u8) -> Block {
+    pub(super) fn block(&self, bounds: Bounds, color: [u8; 3], class: u8) -> Block {
         Block { shape: self.shape(bounds), color, class }
     }
 
-    /// Boards of an open box, its front at y = 0 side towards +y.
-    fn carcass(&mut self, x: [f64; 2], z: [f64; 2], class: u8) {
-        let (wood, y) = ([214, 210, 202], [0.0, DEPTH]);
+    /// Adds a box that does not move.
+    pub(super) fn fix(&mut self, bounds: Bounds, color: [u8; 3], class: u8) {
+        let block = self.block(bounds, color, class);
+        self.fixed.push(block);
+    }
+
+    /// Boards of an open box, its front towards +y.
+    pub(super) fn carcass(&mut self, x: [f64; 2], y: [f64; 2], z: [f64; 2], class: u8) {
         let inner = [x[0] + BOARD, x[1] - BOARD];
         for bounds in [
             [[x[0], x[0] + BOARD], y, z],
             [[x[1] - BOARD, x[1]], y, z],
             [inner, y, [z[0], z[0] + BOARD]],
             [inner, y, [z[1] - BOARD, z[1]]],
-            [inner, [0.0, BOARD], [z[0] + BOARD, z[1] - BOARD]],
+            [inner, [y[0], y[0] + BOARD], [z[0] + BOARD, z[1] - BOARD]],
         ] {
-            let block = self.block(bounds, wood, class);
-            self.fixed.push(block);
+            self.fix(bounds, WOOD, class);
         }
     }
 
     /// A front with its handle and joint. `hinge`: `None` slides, else the side seen from the person.
-    fn part(&mut self, noun: &'static str, x: [f64; 2], z: [f64; 2], hinge: Option<Side>, base: [[f64; 2]; 3]) {
+    fn part(&mut self, noun: &'static str, x: [f64; 2], z: [f64; 2], hinge: Option<Side>, base: Bounds) {
         let class = CLASSES.iter().position(|c| *c == noun).map_or(0, |i| i as u8 + 1);
         let face = DEPTH + BOARD + GAP;
         let (fx, fz) = ([x[0] + 0.5 * GAP, x[1] - 0.5 * GAP], [z[0] + 0.5 * GAP, z[1] - 0.5 * GAP]);
-        let mut bounds = vec![[fx, [face - BOARD, face], fz]];
-        // The person looks along -y: their left is +x.
+        let mut boxes = vec![([fx, [face - BOARD, face], fz], self.front)];
+        let (middle_x, middle_z) = (0.5 * (fx[0] + fx[1]), 0.5 * (fz[0] + fz[1]));
         let (hx, hz, upright) = match hinge {
-            Some(Side::Left) => (fx[0] + 0.045, handle_height(fz), true),
-            Some(Side::Right) => (fx[1] - 0.045, handle_height(fz), true),
-            Some(Side::Bottom) => (0.5 * (fx[0] + fx[1]), fz[1] - 0.05, false),
-            Some(Side::Top) => (0.5 * (fx[0] + fx[1]), fz[0] + 0.05, false),
-            None => {
-                (0.5 * (fx[0] + fx[1]), if fz[1] - fz[0] > 0.25 { fz[1] - 0.06 } else { 0.5 * (fz[0] + fz[1]) }, false)
-            }
-        };
-        let (bar, thin) = (0.07, 0.006);
-        let handle_bounds = if upright {
-            [[hx - thin, hx + thin], [face, face + 0.04], [hz - bar, hz + bar]]
-        } else {
-            [[hx - bar, hx + bar], [face, face + 0.04], [hz - thin, hz + thin]]
+            Some(side) => grip(side, fx, fz),
+            None => (middle_x, if fz[1] - fz[0] > 0.25 { fz[1] - 0.06 } else { middle_z }, false),
         };
         if hinge.is_none() {
-            // The tray.
-            let inner = [x[0] + BOARD + 0.01, x[1] - BOARD - 0.01];
-            let (low, high) = (z[0] + BOARD + 0.01, z[0] + BOARD + 0.01 + 0.6 * (z[1] - z[0]));
-            let y = [0.06, face - BOARD];
-            bounds.push([[inner[0], inner[0] + 0.012], y, [low, high]]);
-            bounds.push([[inner[1] - 0.012, inner[1]], y, [low, high]]);
-            bounds.push([inner, y, [low, low + 0.012]]);
-            bounds.push([inner, [y[0], y[0] + 0.012], [low, high]]);
+            boxes.extend(tray(x, z, face).map(|b| (b, TRAY)));
         }
-        let mut blocks: Vec<Block> = bounds
-            .iter()
-            .enumerate()
-            .map(|(i, b)| self.block(*b, if i == 0 { self.front } else { [226, 222, 214] }, class))
-            .collect();
-        blocks.push(self.block(handle_bounds, [58, 60, 64], class));
-        bounds.push(handle_bounds);
-        let whole: [[f64; 2]; 3] = std::array::from_fn(|i| {
-            [
-                bounds.iter().map(|b| b[i][0]).fold(f64::INFINITY, f64::min),
-                bounds.iter().map(|b| b[i][1]).fold(f64::NEG_INFINITY, f64::max),
-            ]
-        });
-        let at = |x: f64, y: f64, z: f64| self.world_from_kitchen * Point::new(x, y, z);
-        let along = |v: Vector| self.world_from_kitchen * v;
-        let (middle_x, middle_z) = (0.5 * (fx[0] + fx[1]), 0.5 * (fz[0] + fz[1]));
-        // Hinges run along the front edge of the leaf; positive turns the free edge out (+y).
-        let articulation = match hinge {
-            Some(Side::Left) => {
-                Articulation { kind: JointKind::Revolute, axis: along(-Vector::z()), origin: at(fx[1], face, middle_z) }
-            }
-            Some(Side::Right) => {
-                Articulation { kind: JointKind::Revolute, axis: along(Vector::z()), origin: at(fx[0], face, middle_z) }
-            }
-            Some(Side::Bottom) => {
-                Articulation { kind: JointKind::Revolute, axis: along(-Vector::x()), origin: at(middle_x, face, fz[0]) }
-            }
-            Some(Side::Top) => {
-                Articulation { kind: JointKind::Revolute, axis: along(Vector::x()), origin: at(middle_x, face, fz[1]) }
-            }
-            None => Articulation {
-                kind: JointKind::Prismatic,
-                axis: along(Vector::y()),
-                origin: at(middle_x, face, middle_z),
-            },
+        boxes.push((bar(hx, hz, face, upright), HANDLE));
+        let (joint, (axis, origin)) = match hinge {
+            Some(side) => (JointKind::Revolute, hinge_line(side, fx, fz, face)),
+            None => (JointKind::Prismatic, (Vector::y(), Point::new(middle_x, face, middle_z))),
         };
         let upper = match hinge {
             Some(Side::Bottom) => 1.4,
@@ -173,24 +162,91 @@ impl Builder {
             Some(_) => 1.7,
             None => 0.42,
         };
-        let part = OpenPart {
+        let kind = match (noun, hinge) {
+            ("cupboard", Some(Side::Top)) => "flap",
+            ("cupboard", _) => "door",
+            _ => noun,
+        };
+        let handle = Point::new(hx, face + 0.035, hz);
+        let handle_along = if upright { Vector::z() } else { Vector::x() };
+        self.add(Moving { kind, noun, class, boxes, joint, axis, origin, upper, handle, handle_along, base });
+    }
+
+    /// Places a part in the world.
+    pub(super) fn add(&mut self, part: Moving) {
+        let whole: Bounds = std::array::from_fn(|i| {
+            [
+                part.boxes.iter().map(|(b, _)| b[i][0]).fold(f64::INFINITY, f64::min),
+                part.boxes.iter().map(|(b, _)| b[i][1]).fold(f64::NEG_INFINITY, f64::max),
+            ]
+        });
+        let here = self.world_from_kitchen;
+        let blocks = part.boxes.iter().map(|(b, color)| self.block(*b, *color, part.class)).collect();
+        let placed = OpenPart {
             id: format!("part_{:02}", self.parts.len()),
-            noun,
-            articulation,
-            upper,
-            handle: at(hx, face + 0.035, hz),
-            out: along(Vector::y()),
+            kind: part.kind,
+            noun: part.noun,
+            articulation: Articulation { kind: part.joint, axis: here * part.axis, origin: here * part.origin },
+            upper: part.upper,
+            handle: here * part.handle,
+            handle_along: here * part.handle_along,
+            out: here * Vector::y(),
             bounds: self.shape(whole),
-            base: self.shape(base),
+            base: self.shape(part.base),
             blocks,
         };
-        self.parts.push(part);
+        self.parts.push(placed);
+    }
+}
+
+/// Side boards, bottom and back of a drawer behind its front.
+pub(super) fn tray(x: [f64; 2], z: [f64; 2], face: f64) -> [Bounds; 4] {
+    let inner = [x[0] + BOARD + 0.01, x[1] - BOARD - 0.01];
+    let (low, high) = (z[0] + BOARD + 0.01, z[0] + BOARD + 0.01 + 0.6 * (z[1] - z[0]));
+    let y = [0.06, face - BOARD];
+    [
+        [[inner[0], inner[0] + 0.012], y, [low, high]],
+        [[inner[1] - 0.012, inner[1]], y, [low, high]],
+        [inner, y, [low, low + 0.012]],
+        [inner, [y[0], y[0] + 0.012], [low, high]],
+    ]
+}
+
+/// A handle's bar on a front whose surface is at `face`.
+pub(super) fn bar(hx: f64, hz: f64, face: f64, upright: bool) -> Bounds {
+    let (bar, thin) = (0.07, 0.006);
+    if upright {
+        [[hx - thin, hx + thin], [face, face + 0.04], [hz - bar, hz + bar]]
+    } else {
+        [[hx - bar, hx + bar], [face, face + 0.04], [hz - thin, hz + thin]]
+    }
+}
+
+/// Where the handle of a hinged front sits (x, z), and whether its bar is upright. The person looks along -y: their left
+/// is +x.
+pub(super) fn grip(side: Side, fx: [f64; 2], fz: [f64; 2]) -> (f64, f64, bool) {
+    match side {
+        Side::Left => (fx[0] + 0.045, handle_height(fz), true),
+        Side::Right => (fx[1] - 0.045, handle_height(fz), true),
+        Side::Bottom => (0.5 * (fx[0] + fx[1]), fz[1] - 0.05, false),
+        Side::Top => (0.5 * (fx[0] + fx[1]), fz[0] + 0.05, false),
+    }
+}
+
+/// Axis and origin of a hinged front. Hinges run along the front edge of the leaf; positive turns the free edge out (+y).
+pub(super) fn hinge_line(side: Side, fx: [f64; 2], fz: [f64; 2], face: f64) -> (Vector, Point) {
+    let (middle_x, middle_z) = (0.5 * (fx[0] + fx[1]), 0.5 * (fz[0] + fz[1]));
+    match side {
+        Side::Left => (-Vector::z(), Point::new(fx[1], face, middle_z)),
+        Side::Right => (Vector::z(), Point::new(fx[0], face, middle_z)),
+        Side::Bottom => (-Vector::x(), Point::new(middle_x, face, fz[0])),
+        Side::Top => (Vector::x(), Point::new(middle_x, face, fz[1])),
     }
 }
 
 /// Where the hinge is, seen by the person who stands before the furniture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Side {
+pub(super) enum Side {
     Left,
     Right,
     Top,
@@ -235,18 +291,18 @@ pub fn build(rng: &mut Pcg64Mcg) -> Kitchen {
                 let mut top = high;
                 for h in heights {
                     let z = [top - h, top];
-                    b.carcass(span, z, 1);
+                    b.carcass(span, [0.0, DEPTH], z, 1);
                     b.part("drawer", span, z, None, [span, [0.0, DEPTH], z]);
                     top -= h;
                 }
             }
             1 => {
-                b.carcass(span, [low, high], 2);
+                b.carcass(span, [0.0, DEPTH], [low, high], 2);
                 let side = if rng.random_bool(0.5) { Side::Left } else { Side::Right };
                 b.part("cupboard", span, [low, high], Some(side), base);
             }
             _ => {
-                b.carcass(span, [low, high], 4);
+                b.carcass(span, [0.0, DEPTH], [low, high], 4);
                 b.part("dishwasher", span, [low, high], Some(Side::Bottom), base);
             }
         }
@@ -265,7 +321,7 @@ pub fn build(rng: &mut Pcg64Mcg) -> Kitchen {
     // The fridge at the end of the row: a freezer door below, the fridge door above.
     let span = [row, row + 0.6];
     for (z, side) in [([0.1, 0.72], rng.random_bool(0.5)), ([0.72, 1.95], rng.random_bool(0.5))] {
-        b.carcass(span, z, 3);
+        b.carcass(span, [0.0, DEPTH], z, 3);
         b.part("fridge", span, z, Some(if side { Side::Left } else { Side::Right }), [span, [0.0, DEPTH], z]);
     }
     // A sideboard across the room, turned against it: nothing about it follows the room's directions.
@@ -278,17 +334,15 @@ pub fn build(rng: &mut Pcg64Mcg) -> Kitchen {
         ([far, [-0.05, 0.0], [0.0, 2.6]], [206, 204, 196]),
         ([far, [-0.05, 5.0], [-0.05, 0.0]], [150, 146, 140]),
     ] {
-        let block = b.block(bounds, color, 0);
-        b.fixed.push(block);
+        b.fix(bounds, color, 0);
     }
     for _ in 0..4 {
         let (px, py) = (rng.random_range(0.1..row - 0.2), rng.random_range(0.1..0.35));
         let (w, h) = (rng.random_range(0.04..0.1), rng.random_range(0.08..0.28));
         let color = [rng.random_range(60..220u8), rng.random_range(60..220u8), rng.random_range(60..220u8)];
-        let block = b.block([[px, px + w], [py, py + w], [high + 0.04, high + 0.04 + h]], color, 0);
-        b.fixed.push(block);
+        b.fix([[px, px + w], [py, py + w], [high + 0.04, high + 0.04 + h]], color, 0);
     }
-    Kitchen { fixed: b.fixed, parts: b.parts }
+    Kitchen { fixed: b.fixed, parts: b.parts, classes: &CLASSES }
 }
 
 impl Builder {
@@ -300,9 +354,9 @@ impl Builder {
         let (left, right, z) = ([0.0, 0.5], [0.5, 1.0], [0.08, 0.6]);
         let base = |span: [f64; 2]| [span, [0.0, DEPTH], z];
         let side = if rng.random_bool(0.5) { Side::Left } else { Side::Right };
-        self.carcass(left, z, 2);
+        self.carcass(left, [0.0, DEPTH], z, 2);
         self.part("cupboard", left, z, Some(side), base(left));
-        self.carcass(right, z, 1);
+        self.carcass(right, [0.0, DEPTH], z, 1);
         self.part("drawer", right, z, None, base(right));
         self.world_from_kitchen = here;
     }
@@ -313,34 +367,67 @@ impl Builder {
         let shift = Pose::translation(0.0, 0.35 - DEPTH, 0.0);
         let here = self.world_from_kitchen;
         self.world_from_kitchen = here * shift;
-        let wood = [214, 210, 202];
         let y = [DEPTH - 0.35, DEPTH];
-        for bounds in [
-            [[x[0], x[0] + BOARD], y, z],
-            [[x[1] - BOARD, x[1]], y, z],
-            [[x[0] + BOARD, x[1] - BOARD], y, [z[0], z[0] + BOARD]],
-            [[x[0] + BOARD, x[1] - BOARD], y, [z[1] - BOARD, z[1]]],
-            [[x[0] + BOARD, x[1] - BOARD], [y[0], y[0] + BOARD], [z[0] + BOARD, z[1] - BOARD]],
-        ] {
-            let block = self.block(bounds, wood, 2);
-            self.fixed.push(block);
-        }
+        self.carcass(x, y, z, 2);
         self.part("cupboard", x, z, Some(side), [x, y, z]);
         self.world_from_kitchen = here;
     }
 }
 
 impl Kitchen {
-    /// All boxes with the parts at the given openings and the hand's boxes.
+    /// All boxes with the parts at the given openings and the hand's boxes. `swallowed`: a part whose furniture shows
+    /// another mask class.
     #[must_use]
-    pub fn posed(&self, openings: &[f64], hand: &[OrientedBox]) -> Vec<Block> {
+    pub fn posed(&self, openings: &[f64], hand: &[OrientedBox], swallowed: Option<(usize, u8)>) -> Vec<Block> {
         let mut blocks = self.fixed.clone();
-        for (part, opening) in self.parts.iter().zip(openings) {
+        if let Some((part, class)) = swallowed.and_then(|(index, class)| Some((self.parts.get(index)?, class))) {
+            for block in blocks.iter_mut().filter(|b| b.class != 0 && part.base.contains(&b.shape.center)) {
+                block.class = class;
+            }
+        }
+        for (index, (part, opening)) in self.parts.iter().zip(openings).enumerate() {
             let motion = part.articulation.motion(*opening);
-            blocks.extend(part.blocks.iter().map(|b| Block { shape: b.shape.moved(&motion), ..*b }));
+            let class = swallowed.filter(|(swallowed, _)| *swallowed == index).map(|(_, class)| class);
+            blocks.extend(part.blocks.iter().map(|b| Block {
+                shape: b.shape.moved(&motion),
+                class: class.unwrap_or(b.class),
+                ..*b
+            }));
         }
         blocks.extend(hand.iter().map(|h| Block { shape: *h, color: [206, 150, 120], class: HAND_CLASS }));
         blocks
+    }
+
+    /// The same kitchen moved as a whole.
+    #[must_use]
+    pub fn moved(&self, motion: &Pose) -> Self {
+        let block = |b: &Block| Block { shape: b.shape.moved(motion), ..*b };
+        let part = |p: &OpenPart| OpenPart {
+            articulation: Articulation {
+                axis: motion * p.articulation.axis,
+                origin: motion * p.articulation.origin,
+                ..p.articulation
+            },
+            handle: motion * p.handle,
+            handle_along: motion * p.handle_along,
+            out: motion * p.out,
+            bounds: p.bounds.moved(motion),
+            base: p.base.moved(motion),
+            blocks: p.blocks.iter().map(block).collect(),
+            ..p.clone()
+        };
+        Self {
+            fixed: self.fixed.iter().map(block).collect(),
+            parts: self.parts.iter().map(part).collect(),
+            classes: self.classes,
+        }
+    }
+
+    /// Whether a point has this much free space around it, everything closed.
+    #[must_use]
+    pub fn is_free(&self, point: &Point, margin: f64) -> bool {
+        let holds = |b: &OrientedBox| OrientedBox { half: b.half.map(|h| h + margin), ..*b }.contains(point);
+        !self.fixed.iter().any(|b| holds(&b.shape)) && !self.parts.iter().any(|p| holds(&p.bounds) || holds(&p.base))
     }
 }
 

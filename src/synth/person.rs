@@ -56,7 +56,11 @@ pub struct Take {
     pub clips: Vec<TrueClip>,
 }
 
-const FPS: f64 = 12.0;
+/// Frames a second during interactions.
+pub(super) const FPS: f64 = 12.0;
+/// Frames in which the hand reaches, and in which it withdraws.
+pub(super) const REACH: usize = 8;
+pub(super) const LEAVE: usize = 8;
 
 /// A camera at `eye` that looks at `target`, upright.
 #[must_use]
@@ -69,7 +73,7 @@ pub fn look_at(eye: &Point, target: &Point) -> Pose {
 }
 
 /// Minimum-jerk progress.
-fn smooth_step(s: f64) -> f64 {
+pub(super) fn smooth_step(s: f64) -> f64 {
     let s = s.clamp(0.0, 1.0);
     s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s)
 }
@@ -167,7 +171,48 @@ pub fn play(kitchen: &Kitchen, count: usize, hard: bool, rng: &mut Pcg64Mcg) -> 
 }
 
 impl Take {
-    fn still(&mut self, time_secs: f64, world_from_camera: Pose, openings: &[f64]) {
+    /// For each frame the index of the clip during or after which it was taken; `None` before the first, and clips that
+    /// move no joint do not count.
+    #[must_use]
+    pub fn segments(&self) -> Vec<Option<usize>> {
+        let mut segments = vec![None; self.frames.len()];
+        for (index, clip) in self.clips.iter().enumerate().filter(|(_, c)| c.part.is_some()) {
+            for segment in segments.iter_mut().skip(clip.true_span[0]) {
+                *segment = Some(index);
+            }
+        }
+        segments
+    }
+
+    /// In a share `wrong` of clips the noun is one of the other joint type, in a share `vague` it is "it".
+    pub(super) fn misname(&mut self, kitchen: &Kitchen, wrong: f64, vague: f64, rng: &mut Pcg64Mcg) {
+        for clip in &mut self.clips {
+            let Some(part) = kitchen.parts.iter().find(|p| clip.part.as_ref() == Some(&p.id)) else { continue };
+            let draw: f64 = rng.random();
+            if draw < wrong {
+                let noun = if part.articulation.kind == JointKind::Revolute { "drawer" } else { "cupboard" };
+                (clip.noun, clip.narration) = (noun.to_owned(), format!("{} the {noun}", clip.verb));
+            } else if draw < wrong + vague {
+                (clip.noun, clip.narration) = ("it".to_owned(), format!("{} it", clip.verb));
+            }
+        }
+    }
+
+    /// The same take moved as a whole.
+    #[must_use]
+    pub(super) fn moved(mut self, motion: &Pose) -> Self {
+        for frame in &mut self.frames {
+            frame.world_from_camera = motion * frame.world_from_camera;
+            frame.grasp = frame.grasp.map(|(grasp, wrist)| (motion * grasp, motion * wrist));
+            for shape in &mut frame.hand {
+                *shape = shape.moved(motion);
+            }
+        }
+        self
+    }
+
+    /// A frame without interaction.
+    pub(super) fn still(&mut self, time_secs: f64, world_from_camera: Pose, openings: &[f64]) {
         self.frames.push(TrueFrame {
             time_secs,
             world_from_camera,
@@ -223,7 +268,7 @@ impl Take {
             Vector::new(rng.random_range(-0.01..0.01), rng.random_range(-0.01..0.01), rng.random_range(-0.01..0.01));
 
         let seconds = rng.random_range(1.3..2.0);
-        let (reach, moving, leave) = (8, (seconds * FPS) as usize, 8);
+        let (reach, moving, leave) = (REACH, (seconds * FPS) as usize, LEAVE);
         let first = self.frames.len();
         let (start, end) = match action {
             Action::Open => (0.0, opened),

@@ -65,6 +65,33 @@ pub fn cast(blocks: &[Block], world_from_camera: &Pose, camera: &Camera) -> Pict
     picture
 }
 
+/// Gaussian blur of a row-major image; nothing happens for a standard deviation of 0 pixels.
+pub(super) fn blur(rgb: &mut [[u8; 3]], width: usize, sigma_px: f64) {
+    if sigma_px <= 0.0 || width == 0 {
+        return;
+    }
+    let reach = (2.5 * sigma_px).ceil() as i64;
+    let weights: Vec<f32> = (-reach..=reach).map(|d| (-0.5 * (d as f64 / sigma_px).powi(2)).exp() as f32).collect();
+    let total: f32 = weights.iter().sum();
+    let height = rgb.len() / width;
+    for is_row in [true, false] {
+        let before = rgb.to_vec();
+        for (i, pixel) in rgb.iter_mut().enumerate() {
+            let (x, y) = (i % width, i / width);
+            let (at, size) = if is_row { (x, width) } else { (y, height) };
+            let mut sum = [0.0f32; 3];
+            for (d, weight) in (-reach..=reach).zip(&weights) {
+                let there = (at as i64 + d).clamp(0, size as i64 - 1) as usize;
+                let from = if is_row { y * width + there } else { there * width + x };
+                for (s, c) in sum.iter_mut().zip(before[from]) {
+                    *s += weight * f32::from(c);
+                }
+            }
+            *pixel = sum.map(|s| (s / total).round() as u8);
+        }
+    }
+}
+
 /// Nearest positive ray parameter at which a ray from the origin enters a box at `center` (box axes), and the entered side.
 fn hit(center: &Vector, direction: &Vector, half: &Vector) -> Option<(f64, usize)> {
     let (mut enter, mut leave, mut axis) = (0.02, f64::INFINITY, usize::MAX);
@@ -156,6 +183,17 @@ mod tests {
     use super::*;
     use crate::math::Point;
     use crate::twin::OrientedBox;
+
+    #[test]
+    fn a_blurred_point_keeps_its_light_and_spreads_evenly() {
+        let mut rgb = vec![[0u8; 3]; 21 * 21];
+        rgb[10 * 21 + 10] = [250; 3];
+        blur(&mut rgb, 21, 0.8);
+        let sum: u32 = rgb.iter().map(|p| u32::from(p[1])).sum();
+        assert!((240..=260).contains(&sum), "{sum}");
+        let at = |x: usize, y: usize| rgb[y * 21 + x][0];
+        assert!(at(9, 10) == at(11, 10) && at(10, 9) == at(11, 10) && at(11, 10) < at(10, 10) && at(11, 10) > 10);
+    }
 
     #[test]
     fn a_wall_two_metres_ahead_is_two_metres_deep_everywhere() {
