@@ -192,7 +192,9 @@ mod tests {
         let sum: u32 = rgb.iter().map(|p| u32::from(p[1])).sum();
         assert!((240..=260).contains(&sum), "{sum}");
         let at = |x: usize, y: usize| rgb[y * 21 + x][0];
-        assert!(at(9, 10) == at(11, 10) && at(10, 9) == at(11, 10) && at(11, 10) < at(10, 10) && at(11, 10) > 10);
+        assert!(at(9, 10) == at(11, 10) && at(10, 9) == at(10, 11) && at(11, 10) < at(10, 10) && at(11, 10) > 10);
+        // Rows are rounded to whole levels before columns are blurred.
+        assert!(at(10, 9).abs_diff(at(11, 10)) <= 1);
     }
 
     #[test]
