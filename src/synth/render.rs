@@ -94,7 +94,7 @@ pub(super) fn blur(rgb: &mut [[u8; 3]], width: usize, sigma_px: f64) {
 
 /// Nearest positive ray parameter at which a ray from the origin enters a box at `center` (box axes), and the entered side.
 fn hit(center: &Vector, direction: &Vector, half: &Vector) -> Option<(f64, usize)> {
-    let (mut enter, mut leave, mut axis) = (0.02, f64::INFINITY, usize::MAX);
+    let (mut enter, mut leave, mut axis) = (NEAR_M, f64::INFINITY, usize::MAX);
     for k in 0..3 {
         let d = direction[k];
         if d.abs() < 1e-12 {
@@ -116,23 +116,30 @@ fn hit(center: &Vector, direction: &Vector, half: &Vector) -> Option<(f64, usize
     (axis < 3).then_some((enter, axis))
 }
 
-/// Pixels that a box may cover: all of them where it reaches behind the camera.
+/// Nothing nearer to the camera than this is seen, metres.
+const NEAR_M: f64 = 0.02;
+
+/// Pixels that a box may cover.
 fn pixel_bounds(
     block: &Block,
     camera_from_world: &Pose,
     camera: &Camera,
 ) -> (std::ops::Range<usize>, std::ops::Range<usize>) {
-    let all = (0..camera.width, 0..camera.height);
     let corners = block.shape.corners().map(|c| camera_from_world * c);
-    if corners.iter().all(|c| c.z < 0.02) {
+    if corners.iter().all(|c| c.z < NEAR_M) {
         return (0..0, 0..0);
     }
-    if corners.iter().any(|c| c.z < 0.05) {
-        return all;
-    }
+    // What lies before the camera: the corners there, and where edges that reach behind it pass the near plane. Edges join
+    // corners whose numbers differ in one bit.
+    let before = corners.iter().filter(|c| c.z >= NEAR_M).copied();
+    let crossings = (0..8).flat_map(|i| [1, 2, 4].map(|bit| (i, i ^ bit))).filter_map(|(i, j)| {
+        let (a, b) = (corners[i], corners[j]);
+        (a.z >= NEAR_M && b.z < NEAR_M).then(|| a + (b - a) * ((a.z - NEAR_M) / (a.z - b.z)))
+    });
     let mut low = [f64::INFINITY; 2];
     let mut high = [f64::NEG_INFINITY; 2];
-    for (u, v) in corners.iter().filter_map(|c| camera.project(c)) {
+    for p in before.chain(crossings) {
+        let (u, v) = (camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy);
         low = [low[0].min(u), low[1].min(v)];
         high = [high[0].max(u), high[1].max(v)];
     }
