@@ -136,7 +136,7 @@ pub fn open_views<'a>(
 }
 
 /// How well a joint explains the open views: of the face's points that it moves clearly, the share that is seen where it
-/// puts them rather than seen through there, and the number of points. `rect` bounds the points where it is known.
+/// puts them rather than seen through there, and no longer where they were; and the number of such sights. `rect` bounds the points where it is known.
 ///
 /// Hands and depth disagree by a few centimetres that stay the same over a clip (a hand's distance is the least certain thing
 /// about it): the opening that the hand tells is taken with an offset of its own, the one that explains most, less what so
@@ -179,23 +179,41 @@ fn seen_share(
     const HALF_M: f64 = 0.12;
     const STEPS: usize = 12;
     let bounds = rect.map_or([[-HALF_M, HALF_M]; 2], |r| r.bounds);
-    let (mut there, mut through) = (0usize, 0usize);
+    let (mut explained, mut count) = (0usize, 0usize);
     for view in views {
         let motion = joint.motion(joint.opening_at(grip, &view.grip) + offset);
+        let back = motion.inverse();
         for i in 0..STEPS * STEPS {
             let at = |k: usize, b: [f64; 2]| b[0] + (b[1] - b[0]) * (k as f64 + 0.5) / STEPS as f64;
             let here = face.point(at(i % STEPS, bounds[0]), at(i / STEPS, bounds[1]), 0.0);
             let moved = motion * here;
-            let Some((gap, z)) = view.gap(&moved) else { continue };
-            if (moved - here).norm() < 2.0 * tolerance(z) {
-                continue;
+            let travel = (moved - here).norm();
+            // Where it goes. Within the face there is a surface whether the part slid there or not.
+            if let Some((gap, z)) = view.gap(&moved)
+                && travel >= 2.0 * tolerance(z)
+                && gap >= -tolerance(z)
+                && face.coordinates(&moved)[2].abs() > tolerance(z)
+            {
+                count += 1;
+                explained += usize::from(gap <= tolerance(z));
             }
-            there += usize::from(gap.abs() <= tolerance(z));
-            through += usize::from(gap > tolerance(z));
+            // Where it was, unless another piece of it is there now.
+            if let Some((gap, z)) = view.gap(&here)
+                && travel >= 2.0 * tolerance(z)
+                && gap >= -tolerance(z)
+            {
+                let [right, up, out] = face.coordinates(&(back * here));
+                let within = |x: f64, b: [f64; 2]| (b[0]..=b[1]).contains(&x);
+                let covered =
+                    out.abs() <= tolerance(z) && within(right, bounds[0]) && within(up, bounds[1]);
+                if !covered {
+                    count += 1;
+                    explained += usize::from(gap > tolerance(z));
+                }
+            }
         }
     }
-    let count = there + through;
-    (there as f64 / count.max(1) as f64, count)
+    (explained as f64 / count.max(1) as f64, count)
 }
 
 /// Depth noise that a surface at distance `z` may show: half a voxel and 2 % of the distance (metric depth estimates).
