@@ -85,7 +85,7 @@ fn hand(furniture: &Furniture) -> Trajectory {
             Sample { frame: i as usize, time_secs: 2.0 * s, observed: p, smoothed: p, accepted: true }
         })
         .collect();
-    Trajectory { side: None, samples, action: Action::Open }
+    Trajectory { side: None, samples, action: Action::Open, ends_seen: [true; 2] }
 }
 
 fn kitchen(units: usize) -> Twin {

@@ -109,7 +109,7 @@ block! {
         /// Contact that begins inside a narration is followed beyond its bounds by at most this (0 = not at all).
         widen_secs: f64 = 2.0, "s", "ours";
         /// Fewer samples in contact than this give no answer.
-        min_samples: usize = 3, "samples", "ours";
+        min_samples: usize = 1, "samples", "ours";
     }
 }
 
@@ -356,6 +356,7 @@ impl Config {
     pub fn paper() -> Self {
         let mut config = Self { method: Method::Paper, ..Self::default() };
         config.hands.restart_after = 0;
+        config.hands.min_samples = 3;
         config.hands.widen_secs = 0.0;
         config.localization.closed_state_frames = false;
         config.localization.occlusion = false;

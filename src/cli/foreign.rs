@@ -132,7 +132,7 @@ pub fn load(path: &Path, args: &ForeignArgs) -> anyhow::Result<(Twin, Vec<JointH
                 accepted: true,
             })
             .collect();
-        let made = Trajectory { side: None, samples, action };
+        let made = Trajectory { side: None, samples, action, ends_seen: [true; 2] };
         if let Err(fault) = made.check() {
             bail!("{}: {fault}", shown(file));
         }

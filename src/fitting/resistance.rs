@@ -155,7 +155,7 @@ mod tests {
                 Sample { frame, time_secs: t, observed: p, smoothed: p, accepted: true }
             })
             .collect();
-        Trajectory { side: None, samples, action }
+        Trajectory { side: None, samples, action, ends_seen: [true; 2] }
     }
 
     /// Where a door with a damping and a friction comes to rest that is let go at an opening and a speed.

@@ -140,27 +140,38 @@ pub fn open_views<'a>(
 ///
 /// Hands and depth disagree by a few centimetres that stay the same over a clip (a hand's distance is the least certain thing
 /// about it): the opening that the hand tells is taken with an offset of its own, the one that explains most, less what so
-/// large an offset is believed in.
+/// large an offset is believed in. `grip_std_m` is the spread of the offsets, metres.
 #[must_use]
-pub fn agreement(face: &Face, rect: Option<&Rect>, joint: &Articulation, grip: &Point, views: &[View]) -> (f64, usize) {
-    const OFFSETS_M: [f64; 7] = [0.0, -0.02, 0.02, -0.04, 0.04, -0.06, 0.06];
-    /// Spread of the offsets, metres.
-    const OFFSET_STD_M: f64 = 0.03;
+pub fn agreement(
+    face: &Face,
+    rect: Option<&Rect>,
+    joint: &Articulation,
+    grip: &Point,
+    grip_std_m: f64,
+    views: &[View],
+) -> (f64, usize) {
+    /// Between two offsets, metres: what the depth's tolerance bridges.
+    const STEP_M: f64 = 0.02;
     /// Half a squared standard deviation against the log likelihood that the whole share is worth to the reasoner.
     const SHARE_PER_NAT: f64 = 1.0 / 18.0;
     let lever = match joint.kind {
         JointKind::Prismatic => 1.0,
         JointKind::Revolute => joint.line().distance(grip).max(0.05),
     };
-    OFFSETS_M
-        .iter()
+    // Two standard deviations to each side.
+    let reach = (2.0 * grip_std_m / STEP_M).round() as i32;
+    (0..=2 * reach)
+        // From the middle outwards: of equal offsets the smallest is kept.
+        .map(|k| f64::from(if k % 2 == 0 { -k / 2 } else { k / 2 + 1 }) * STEP_M)
         .map(|offset| {
             let (share, count) = seen_share(face, rect, joint, grip, views, offset / lever);
-            ((share - SHARE_PER_NAT * 0.5 * (offset / OFFSET_STD_M).powi(2)).max(0.0), count)
+            ((share - SHARE_PER_NAT * 0.5 * (offset / grip_std_m).powi(2)).max(0.0), count)
         })
         // An offset under which nothing moves clearly explains nothing.
-        .max_by(|a, b| (a.1 >= MIN_POINTS, a.0).partial_cmp(&(b.1 >= MIN_POINTS, b.0)).unwrap_or(Ordering::Equal))
-        .unwrap_or((0.0, 0))
+        .fold((0.0, 0), |best: (f64, usize), a| {
+            let better = (a.1 >= MIN_POINTS, a.0).partial_cmp(&(best.1 >= MIN_POINTS, best.0));
+            if better == Some(Ordering::Greater) || best.1 == 0 { a } else { best }
+        })
 }
 
 /// A share of fewer points is noise.

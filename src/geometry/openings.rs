@@ -16,6 +16,8 @@ use crate::math::{Point, Vector, any_orthogonal, reject, unit};
 pub struct OpenState<'a> {
     /// World.
     pub grip: Point,
+    /// Standard deviation of the grip along the motion, metres.
+    pub grip_std_m: f64,
     /// See [`super::moved::open_views`].
     pub views: &'a [View<'a>],
 }
@@ -45,8 +47,6 @@ pub struct Refit {
 pub struct Noise {
     /// Standard deviation of the hinge given, across its axis, metres.
     pub hinge_m: f64,
-    /// Standard deviation of the hand along the motion, metres.
-    pub hand_m: f64,
     /// Thickness of the leaf: a view of its back sees it that much behind its front, metres.
     pub board_m: f64,
 }
@@ -86,7 +86,7 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
                 JointKind::Prismatic => 1.0,
                 JointKind::Revolute => joint.line().distance(&clip.grip).max(0.1),
             };
-            let std = noise.hand_m / lever;
+            let std = clip.grip_std_m / lever;
             clip.views.iter().map(|view| Seen { view, hand: joint.opening_at(&clip.grip, &view.grip), std }).collect()
         })
         .collect();

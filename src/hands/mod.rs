@@ -35,6 +35,14 @@ pub struct Trajectory {
     pub samples: Vec<Sample>,
     /// Opening or closing: from the narration, else from the motion relative to the person.
     pub action: Action,
+    /// Whether the hand was seen just before the first and just after the last sample, not in contact: else it may have
+    /// held the part for longer than it was seen.
+    #[serde(default = "both_seen")]
+    pub ends_seen: [bool; 2],
+}
+
+fn both_seen() -> [bool; 2] {
+    [true; 2]
 }
 
 impl Trajectory {
@@ -76,6 +84,21 @@ impl Trajectory {
     #[must_use]
     pub fn closed_grip(&self) -> Point {
         self.end(self.action == Action::Open)
+    }
+
+    /// Whether the hand was seen to take hold of the closed part, or to let go of it.
+    #[must_use]
+    pub fn closed_end_seen(&self) -> bool {
+        self.ends_seen[usize::from(self.action == Action::Close)]
+    }
+
+    /// Standard deviation of the closed grip along the motion, metres: a hand's, or that of a hand that was lost on the way.
+    #[must_use]
+    pub fn closed_std_m(&self) -> f64 {
+        // About a third of what a drawer or the handle of a door travels.
+        const LOST_M: f64 = 0.12;
+        const SEEN_M: f64 = 0.03;
+        if self.closed_end_seen() { SEEN_M } else { LOST_M }
     }
 
     /// Where the grip is at the open end of the motion.
@@ -131,6 +154,17 @@ pub fn trajectory(
             config.min_samples
         ));
     };
+    // A blink of the detector; a hand takes as long to reach a handle.
+    const SEEN_SECS: f64 = 0.35;
+    let ends_seen = {
+        let time = |s: &HandSample| recording.frames[s.frame].timestamp_secs;
+        let all = samples_of(side, from.saturating_sub(1), to + 1);
+        let (first, last) = (held[0], held[held.len() - 1]);
+        [
+            all.iter().any(|s| s.frame < first.frame && time(first) - time(s) <= SEEN_SECS),
+            all.iter().any(|s| s.frame > last.frame && time(s) - time(last) <= SEEN_SECS),
+        ]
+    };
     let times: Vec<f64> = held.iter().map(|s| recording.frames[s.frame].timestamp_secs).collect();
     let observed: Vec<Point> = held.iter().map(|s| s.grasp()).collect();
     let smoothed = kalman::smooth(&times, &observed, &filter(config));
@@ -155,7 +189,7 @@ pub fn trajectory(
         return Outcome::Abstained(format!("fewer than {} believable hand samples in contact", config.min_samples));
     }
     let action = reading.action.unwrap_or_else(|| action_by_person(recording, &samples));
-    Outcome::Found(Trajectory { side: Some(side), samples, action })
+    Outcome::Found(Trajectory { side: Some(side), samples, action, ends_seen })
 }
 
 /// The filter of §A.2 with the gate of its p-value.

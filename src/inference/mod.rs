@@ -41,13 +41,15 @@ pub struct ClipJoint {
     pub action: Action,
 }
 
-/// Applies the rules of §A.7 to the candidates under the reasoner's weights.
+/// Applies the rules of §A.7 to the candidates under the reasoner's weights. `seen_to_move`: depth shows that a part moved, so
+/// that a hand that was seen for a moment only is enough.
 #[must_use]
 pub fn infer(
     trajectory: &Trajectory,
     candidates: &[AxisCandidate],
     answer: &Answer,
     face: Option<&Face>,
+    seen_to_move: bool,
     reasoning: &config::Reasoning,
     config: &config::Inference,
 ) -> Outcome<ClipJoint> {
@@ -55,7 +57,7 @@ pub fn infer(
     const MIN_EXTENT_M: f64 = 0.03;
     let positions = trajectory.positions();
     let extent = positions.iter().map(|p| (p - positions[0]).norm()).fold(0.0, f64::max);
-    if extent < MIN_EXTENT_M {
+    if extent < MIN_EXTENT_M && !seen_to_move {
         return Outcome::Abstained(format!("the hand in contact moved by only {:.1} cm", 100.0 * extent));
     }
     let revolute_probability = answer.revolute_probability(candidates);
@@ -92,7 +94,7 @@ pub fn infer(
             let Some(fit) = path::along(&path, &joint.axis, tolerance) else {
                 return Outcome::Abstained("no hand samples".to_owned());
             };
-            if fit.inliers < config.prismatic_min_inliers {
+            if fit.inliers < config.prismatic_min_inliers && !seen_to_move {
                 return Outcome::Abstained(format!(
                     "only {:.0} % of the hand samples lie on any slide ({:.0} % are needed)",
                     100.0 * fit.inliers,

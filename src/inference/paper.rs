@@ -98,7 +98,7 @@ mod tests {
             .enumerate()
             .map(|(i, p)| Sample { frame: i, time_secs: i as f64, observed: p, smoothed: p, accepted: true })
             .collect();
-        Trajectory { side: None, samples, action: Action::Open }
+        Trajectory { side: None, samples, action: Action::Open, ends_seen: [true; 2] }
     }
 
     fn candidate(kind: JointKind, axis: Vector, origin: Point, source: AxisSource) -> AxisCandidate {

@@ -167,12 +167,17 @@ pub fn local_frames(
     };
     // Twice as many neighbours as needed, thinned evenly: viewpoints differ and one bad frame does not decide.
     let want = 2 * config.local_frames;
+    // A hand that was not seen to take hold may have moved the part before it was seen: the narration tells where.
+    let [begin, end] = [
+        if trajectory.ends_seen[0] { first + 1 } else { first.min(clip.start_frame) },
+        if trajectory.ends_seen[1] { last.saturating_sub(1) } else { last.max(clip.end_frame) },
+    ];
     let mut chosen: Vec<usize> = match trajectory.action {
         // The first moment of contact has not moved the part yet.
         Action::Open => {
-            (0..=(first + 1).min(last)).rev().filter(|f| !in_other_clip(*f)).filter(usable).take(want).collect()
+            (0..=begin.min(last)).rev().filter(|f| !in_other_clip(*f)).filter(usable).take(want).collect()
         }
-        Action::Close => (last.saturating_sub(1).max(first)..recording.frames.len())
+        Action::Close => (end.max(first)..recording.frames.len())
             .take_while(|f| !in_other_clip(*f))
             .filter(usable)
             .take(want)

@@ -165,7 +165,14 @@ pub(super) fn infer(
             result
                 .face
                 .as_ref()
-                .map_or((0.0, 0), |f| moved::agreement(f, result.part.as_ref(), &c.joint, &region.grip, &open))
+                .map_or((0.0, 0), |f| moved::agreement(
+                    f,
+                    result.part.as_ref(),
+                    &c.joint,
+                    &region.grip,
+                    trajectory.closed_std_m(),
+                    &open,
+                ))
         })
         .collect();
     let answer = reasoner.answer(&Question {
@@ -183,7 +190,15 @@ pub(super) fn infer(
             inference::paper::infer(trajectory, &result.candidates, answer.words_log_odds, face, &config.inference)
         }
         InferenceMethod::Posterior => {
-            inference::infer(trajectory, &result.candidates, &answer, face, &config.reasoning, &config.inference)
+            inference::infer(
+                trajectory,
+                &result.candidates,
+                &answer,
+                face,
+                result.part.is_some(),
+                &config.reasoning,
+                &config.inference,
+            )
         }
     };
     // With the joint known, the part is also seen where the joint puts it: the rectangle again, from all evidence.

@@ -76,7 +76,7 @@ fn hand(joint: &Articulation, range: f64) -> Trajectory {
             Sample { frame: i as usize, time_secs: 2.0 * s, observed: p, smoothed: p, accepted: true }
         })
         .collect();
-    Trajectory { side: None, samples, action: Action::Open }
+    Trajectory { side: None, samples, action: Action::Open, ends_seen: [true; 2] }
 }
 
 /// The same hand as it is measured: errors of `std_m` a coordinate that last 0.3 s.
