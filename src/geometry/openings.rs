@@ -94,8 +94,9 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
     // One offset a clip first (a hand is off by as much all along a clip), then each view by itself.
     let mut offsets: Vec<Vec<f64>> = seen
         .iter()
-        .map(|views| {
-            let common = coarse(&leaf, joint, views);
+        .zip(clips)
+        .map(|(views, clip)| {
+            let common = coarse(face, rect, joint, clip, views);
             vec![common; views.len()]
         })
         .collect();
@@ -221,27 +222,22 @@ fn weight(residual: f64, scale: f64) -> f64 {
     1.0 / ((1.0 + x * x) * (1.0 + x * x))
 }
 
-/// The common offset of a clip's openings under which most of the leaf is seen in its place.
-fn coarse(leaf: &Leaf, joint: &Articulation, views: &[Seen]) -> f64 {
-    // In halves of the hand's standard deviation, ten of them to each side: a hand that was lost before the part was closed
-    // is off by decimetres.
-    const REACH: i32 = 20;
+/// The common offset of a clip's openings under which the views explain most, less what so large an offset is believed in.
+fn coarse(face: &Face, rect: &Rect, joint: &Articulation, clip: &OpenState, views: &[Seen]) -> f64 {
+    // Two centimetres at the grip, which the depth's tolerance bridges.
+    const STEP_M: f64 = 0.02;
+    const REACH: f64 = 3.0;
     let Some(std) = views.first().map(|s| s.std) else { return 0.0 };
-    (-REACH..=REACH)
-        .map(|k| {
-            let x = f64::from(k) * 0.5;
-            let (mut there, mut count) = (0.0, 0usize);
-            for s in views {
-                for p in &leaf.points {
-                    if let Some((r, _, _)) = displacement(leaf, p, joint, s.hand + x * std, s.view) {
-                        there += weight(r, LOOSE_M * 0.5);
-                        count += 1;
-                    }
-                }
-            }
-            let share = if count >= super::moved::MIN_POINTS { there / count as f64 } else { 0.0 };
-            // Heavy-tailed, as hands are: one standard deviation costs about what 4 % of the leaf are worth, eight cost 35 %.
-            (share - 0.1 * (x * x / TAIL).ln_1p(), x * std)
+    let steps = (REACH * clip.grip_std_m / STEP_M).round() as i32;
+    let widest = views.iter().map(|s| s.hand).fold(0.0, f64::max);
+    (-steps..=steps)
+        .map(|k| f64::from(k) * STEP_M * std / clip.grip_std_m)
+        // A part is not shut further than shut.
+        .filter(|offset| widest + offset > 0.0)
+        .map(|offset| {
+            let x = offset / std;
+            let seen = super::moved::seen_share(face, Some(rect), joint, &clip.grip, clip.views, offset);
+            (super::moved::log_likelihood(seen) - 0.5 * (TAIL + 1.0) * (x * x / TAIL).ln_1p(), offset)
         })
         .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.abs().total_cmp(&a.1.abs())))
         .map_or(0.0, |(_, offset)| offset)

@@ -174,9 +174,7 @@ pub fn local_frames(
     ];
     let mut chosen: Vec<usize> = match trajectory.action {
         // The first moment of contact has not moved the part yet.
-        Action::Open => {
-            (0..=begin.min(last)).rev().filter(|f| !in_other_clip(*f)).filter(usable).take(want).collect()
-        }
+        Action::Open => (0..=begin.min(last)).rev().filter(|f| !in_other_clip(*f)).filter(usable).take(want).collect(),
         Action::Close => (end.max(first)..recording.frames.len())
             .take_while(|f| !in_other_clip(*f))
             .filter(usable)

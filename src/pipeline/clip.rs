@@ -162,17 +162,9 @@ pub(super) fn infer(
         .candidates
         .iter()
         .map(|c| {
-            result
-                .face
-                .as_ref()
-                .map_or((0.0, 0), |f| moved::agreement(
-                    f,
-                    result.part.as_ref(),
-                    &c.joint,
-                    &region.grip,
-                    trajectory.closed_std_m(),
-                    &open,
-                ))
+            result.face.as_ref().map_or((0.0, 0), |f| {
+                moved::agreement(f, result.part.as_ref(), &c.joint, &region.grip, trajectory.closed_std_m(), &open)
+            })
         })
         .collect();
     let answer = reasoner.answer(&Question {
@@ -189,17 +181,15 @@ pub(super) fn infer(
         InferenceMethod::Paper => {
             inference::paper::infer(trajectory, &result.candidates, answer.words_log_odds, face, &config.inference)
         }
-        InferenceMethod::Posterior => {
-            inference::infer(
-                trajectory,
-                &result.candidates,
-                &answer,
-                face,
-                result.part.is_some(),
-                &config.reasoning,
-                &config.inference,
-            )
-        }
+        InferenceMethod::Posterior => inference::infer(
+            trajectory,
+            &result.candidates,
+            &answer,
+            face,
+            result.part.is_some(),
+            &config.reasoning,
+            &config.inference,
+        ),
     };
     // With the joint known, the part is also seen where the joint puts it: the rectangle again, from all evidence.
     if let (Some(face), Outcome::Found(joint)) = (&result.face, &result.joint) {

@@ -148,7 +148,9 @@ fn merge_group(
                 .map(|k| {
                     contexts
                         .iter()
-                        .map(|(f, rect, grip)| moved::agreement(f, rect.as_ref(), &k.joint, grip, trajectory.closed_std_m(), &open))
+                        .map(|(f, rect, grip)| {
+                            moved::agreement(f, rect.as_ref(), &k.joint, grip, trajectory.closed_std_m(), &open)
+                        })
                         // A share of few points is noise.
                         .max_by(|a, b| {
                             let rank = |x: &(f64, usize)| (x.1 >= moved::MIN_POINTS, x.0);
@@ -250,14 +252,14 @@ fn refitted<'a>(
     rect: &Rect,
     config: &Config,
 ) -> Option<Refitted<'a>> {
-    let noise = openings::Noise {
-        hinge_m: config.reasoning.hand_std_m,
-        board_m: config.fitting.board_m,
-    };
+    let noise = openings::Noise { hinge_m: config.reasoning.hand_std_m, board_m: config.fitting.board_m };
     let views: Vec<Vec<moved::View>> =
         shown.iter().map(|(clip, t)| moved::open_views(recording, sketches, &clip.clip, t)).collect();
-    let states: Vec<OpenState> =
-        shown.iter().zip(&views).map(|((_, t), views)| OpenState { grip: t.closed_grip(), grip_std_m: t.closed_std_m(), views }).collect();
+    let states: Vec<OpenState> = shown
+        .iter()
+        .zip(&views)
+        .map(|((_, t), views)| OpenState { grip: t.closed_grip(), grip_std_m: t.closed_std_m(), views })
+        .collect();
     let fit = openings::refit(face, rect, joint, &states, &noise)?;
     let ends: Vec<Opening> = shown
         .iter()

@@ -6,7 +6,7 @@
 
 use crate::articulation::JointKind;
 use crate::config;
-use crate::geometry::{AxisCandidate, AxisSource, HingeSide};
+use crate::geometry::{AxisCandidate, AxisSource, HingeSide, moved};
 use crate::math::path;
 
 use super::words::line_factor;
@@ -32,7 +32,7 @@ impl Reasoner for Geometric {
             .iter()
             .zip(question.agreement)
             .map(|(candidate, agreement)| {
-                self.path_log_likelihood(candidate, question) + depth_log_likelihood(*agreement)
+                self.path_log_likelihood(candidate, question) + moved::log_likelihood(*agreement)
             })
             .collect();
         let name = match question.reading.kind {
@@ -81,17 +81,6 @@ impl Geometric {
         let samples = self.reasoning.effective_samples.min(question.path.len() as f64);
         -samples * (1.0 + variance / (2.0 * sigma2)).ln()
     }
-}
-
-/// The open state's depth: of the points that a right joint moves about four fifths are seen in their place, of a wrong
-/// one's about a third by chance. Neighbouring points share their fate, so all of them count as a few.
-fn depth_log_likelihood((share, count): (f64, usize)) -> f64 {
-    const RIGHT: f64 = 0.8;
-    const WRONG: f64 = 0.3;
-    const INDEPENDENT: f64 = 8.0;
-    // With few points the share is noise; with none it says nothing.
-    let weight = INDEPENDENT * (count as f64 / 200.0).min(1.0);
-    weight * (share * (RIGHT / WRONG).ln() + (1.0 - share) * ((1.0 - RIGHT) / (1.0 - WRONG)).ln())
 }
 
 /// Prior of each candidate: that of its source, shared among the candidates of that source (thirty lines are not thirty

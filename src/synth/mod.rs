@@ -466,7 +466,11 @@ mod tests {
             let r = recorded(5, tier, 3, &Changes::default());
             assert_eq!((r.frames(), r.seen.hands.len(), r.take.clips.len()), (frames, hands, 7));
             let (pose, hand) = (r.seen.poses.last().unwrap(), r.seen.hands.last().unwrap());
-            assert!((pose.translation.vector - Vector::from(eye)).norm() < 1e-9, "{tier:?} {:?}", pose.translation.vector);
+            assert!(
+                (pose.translation.vector - Vector::from(eye)).norm() < 1e-9,
+                "{tier:?} {:?}",
+                pose.translation.vector
+            );
             assert!((hand.wrist - Point::from(wrist)).norm() < 1e-9, "{tier:?} {:?}", hand.wrist);
         }
     }
