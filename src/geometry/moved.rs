@@ -58,6 +58,8 @@ pub struct View<'a> {
     factor: f64,
     /// Where the hand holds the part, world.
     pub grip: Point,
+    /// The hand was gone by then and not seen to let go: the part may have moved on.
+    pub lost: bool,
 }
 
 /// A leaf seen at less than this slant (cosine) shows its edge.
@@ -80,19 +82,30 @@ impl View<'_> {
     }
 }
 
+/// A frame of the open state.
+#[derive(Debug, Clone, Copy)]
+pub struct OpenFrame {
+    /// Frame index.
+    pub frame: usize,
+    /// See [`View::grip`].
+    pub grip: Point,
+    /// See [`View::lost`].
+    pub lost: bool,
+}
+
 /// Frames of the open state, with the grip where the hand holds the part in them: while the hand holds it far from closed,
 /// and just after or before it does.
 #[must_use]
-pub fn open_frames(recording: &Recording, clip: &Clip, trajectory: &Trajectory) -> Vec<(usize, Point)> {
+pub fn open_frames(recording: &Recording, clip: &Clip, trajectory: &Trajectory) -> Vec<OpenFrame> {
     const HELD: usize = 6;
     const FREE: usize = 3;
     let closed = trajectory.closed_grip();
     let travel = |p: &Point| (p - closed).norm();
     let furthest = trajectory.samples.iter().map(|s| travel(&s.smoothed)).fold(0.0, f64::max);
     let far: Vec<_> = trajectory.samples.iter().filter(|s| travel(&s.smoothed) > 0.5 * furthest).collect();
-    let mut frames: Vec<(usize, Point)> = (0..far.len().min(HELD))
+    let mut frames: Vec<OpenFrame> = (0..far.len().min(HELD))
         .map(|i| far[i * far.len() / far.len().min(HELD)])
-        .map(|sample| (sample.frame, sample.smoothed))
+        .map(|sample| OpenFrame { frame: sample.frame, grip: sample.smoothed, lost: false })
         .collect();
     // Once let go the part stays where it was left, until the next clip moves something.
     let [first, last] = trajectory.contact_frames();
@@ -107,7 +120,9 @@ pub fn open_frames(recording: &Recording, clip: &Clip, trajectory: &Trajectory) 
         Action::Close => (0..first).rev().take_while(|f| !in_other_clip(*f)).take(4 * FREE).collect(),
     };
     let grip = trajectory.open_grip();
-    frames.extend((0..free.len().min(FREE)).map(|i| (free[i * free.len() / free.len().min(FREE)], grip)));
+    let lost = !trajectory.open_end_seen();
+    let count = free.len().min(FREE);
+    frames.extend((0..count).map(|i| OpenFrame { frame: free[i * free.len() / count], grip, lost }));
     frames
 }
 
@@ -121,7 +136,7 @@ pub fn open_views<'a>(
 ) -> Vec<View<'a>> {
     open_frames(recording, clip, trajectory)
         .into_iter()
-        .filter_map(|(frame, grip)| {
+        .filter_map(|OpenFrame { frame, grip, lost }| {
             let world_from_camera = recording.frames[frame].world_from_camera;
             Some(View {
                 camera_from_world: world_from_camera.inverse(),
@@ -130,6 +145,7 @@ pub fn open_views<'a>(
                 sketch: sketches.get(&frame)?,
                 factor: recording.depth_factor(frame),
                 grip,
+                lost,
             })
         })
         .collect()
@@ -158,20 +174,30 @@ pub fn agreement(
         JointKind::Prismatic => 1.0,
         JointKind::Revolute => joint.line().distance(grip).max(0.05),
     };
-    // Two standard deviations to each side.
-    let reach = (2.0 * grip_std_m / STEP_M).round() as i32;
-    (0..=2 * reach)
-        // From the middle outwards: of equal offsets the smallest is kept.
-        .map(|k| f64::from(if k % 2 == 0 { -k / 2 } else { k / 2 + 1 }) * STEP_M)
-        .map(|offset| {
-            let (share, count) = seen_share(face, rect, joint, grip, views, offset / lever);
-            ((share - SHARE_PER_NAT * 0.5 * (offset / grip_std_m).powi(2)).max(0.0), count)
-        })
-        // An offset under which nothing moves clearly explains nothing.
-        .fold((0.0, 0), |best: (f64, usize), a| {
-            let better = (a.1 >= MIN_POINTS, a.0).partial_cmp(&(best.1 >= MIN_POINTS, best.0));
-            if better == Some(Ordering::Greater) || best.1 == 0 { a } else { best }
-        })
+    // Where a hand was lost before it let go, the views after that have an offset of their own.
+    let of = |lost: bool, std_m: f64| -> (f64, usize) {
+        // Two standard deviations to each side.
+        let reach = (2.0 * std_m / STEP_M).round() as i32;
+        (0..=2 * reach)
+            // From the middle outwards: of equal offsets the smallest is kept.
+            .map(|k| f64::from(if k % 2 == 0 { -k / 2 } else { k / 2 + 1 }) * STEP_M)
+            .map(|offset| {
+                let (share, count) = seen_share(face, rect, joint, grip, views, lost, offset / lever);
+                ((share - SHARE_PER_NAT * 0.5 * (offset / std_m).powi(2)).max(0.0), count)
+            })
+            // An offset under which nothing moves clearly explains nothing.
+            .fold((0.0, 0), |best: (f64, usize), a| {
+                let better = (a.1 >= MIN_POINTS, a.0).partial_cmp(&(best.1 >= MIN_POINTS, best.0));
+                if better == Some(Ordering::Greater) || best.1 == 0 { a } else { best }
+            })
+    };
+    let held = of(false, grip_std_m);
+    if !views.iter().any(|v| v.lost) {
+        return held;
+    }
+    let after = of(true, grip_std_m.hypot(crate::hands::grip_std_m(false)));
+    let count = held.1 + after.1;
+    ((held.0 * held.1 as f64 + after.0 * after.1 as f64) / count.max(1) as f64, count)
 }
 
 /// What [`agreement`] is worth, in nats: of the points that a right joint moves about four fifths are seen in their place, of
@@ -189,13 +215,14 @@ pub fn log_likelihood((share, count): (f64, usize)) -> f64 {
 /// A share of fewer points is noise.
 pub const MIN_POINTS: usize = 100;
 
-/// The share of [`agreement`] with `offset` (rad or m) added to the opening that the hand tells.
+/// The share of [`agreement`] in the views of one sort, with `offset` (rad or m) added to the opening that the hand tells.
 pub(super) fn seen_share(
     face: &Face,
     rect: Option<&Rect>,
     joint: &Articulation,
     grip: &Point,
     views: &[View],
+    lost: bool,
     offset: f64,
 ) -> (f64, usize) {
     // Without a known part, a piece of its face around the grip that the smallest front has.
@@ -203,7 +230,7 @@ pub(super) fn seen_share(
     const STEPS: usize = 12;
     let bounds = rect.map_or([[-HALF_M, HALF_M]; 2], |r| r.bounds);
     let (mut explained, mut count) = (0usize, 0usize);
-    for view in views {
+    for view in views.iter().filter(|v| v.lost == lost) {
         let motion = joint.motion(joint.opening_at(grip, &view.grip) + offset);
         let back = motion.inverse();
         for i in 0..STEPS * STEPS {

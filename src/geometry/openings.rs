@@ -29,6 +29,8 @@ pub struct Opening {
     pub value: f64,
     /// Standard deviation.
     pub std: f64,
+    /// The depth tells it; else the hand does.
+    pub informed: bool,
 }
 
 /// What the depth of the open state says.
@@ -79,25 +81,32 @@ struct Seen<'a> {
 /// Fits the hinge and the opening in every view. `None` where no view sees enough of the leaf in motion.
 #[must_use]
 pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState], noise: &Noise) -> Option<Refit> {
+    let lever = |clip: &OpenState| match joint.kind {
+        JointKind::Prismatic => 1.0,
+        JointKind::Revolute => joint.line().distance(&clip.grip).max(0.1),
+    };
     let seen: Vec<Vec<Seen>> = clips
         .iter()
         .map(|clip| {
-            let lever = match joint.kind {
-                JointKind::Prismatic => 1.0,
-                JointKind::Revolute => joint.line().distance(&clip.grip).max(0.1),
-            };
-            let std = clip.grip_std_m / lever;
-            clip.views.iter().map(|view| Seen { view, hand: joint.opening_at(&clip.grip, &view.grip), std }).collect()
+            clip.views
+                .iter()
+                .map(|view| {
+                    let lost = if view.lost { crate::hands::grip_std_m(false) } else { 0.0 };
+                    let std = clip.grip_std_m.hypot(lost) / lever(clip);
+                    Seen { view, hand: joint.opening_at(&clip.grip, &view.grip), std }
+                })
+                .collect()
         })
         .collect();
     let leaf = Leaf::of(face, rect, noise.board_m);
-    // One offset a clip first (a hand is off by as much all along a clip), then each view by itself.
+    // One offset a clip first (a hand is off by as much all along a clip; after it was lost, another), then each view by
+    // itself.
     let mut offsets: Vec<Vec<f64>> = seen
         .iter()
         .zip(clips)
         .map(|(views, clip)| {
-            let common = coarse(face, rect, joint, clip, views);
-            vec![common; views.len()]
+            let [held, after] = [false, true].map(|lost| coarse(face, rect, joint, clip, views, lost, lever(clip)));
+            views.iter().map(|s| if s.view.lost { after } else { held }).collect()
         })
         .collect();
     let mut shift = [0.0; 2];
@@ -149,7 +158,8 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
                 .map(|(s, offset)| {
                     let std = covariance[(index, index)].max(0.0).sqrt();
                     index += 2;
-                    Opening { value: s.hand + offset, std }
+                    // Half of what was not known before is more than the hand's own word.
+                    Opening { value: s.hand + offset, std, informed: std < 0.7 * s.std }
                 })
                 .collect()
         })
@@ -223,20 +233,30 @@ fn weight(residual: f64, scale: f64) -> f64 {
 }
 
 /// The common offset of a clip's openings under which the views explain most, less what so large an offset is believed in.
-fn coarse(face: &Face, rect: &Rect, joint: &Articulation, clip: &OpenState, views: &[Seen]) -> f64 {
+fn coarse(
+    face: &Face,
+    rect: &Rect,
+    joint: &Articulation,
+    clip: &OpenState,
+    views: &[Seen],
+    lost: bool,
+    lever: f64,
+) -> f64 {
     // Two centimetres at the grip, which the depth's tolerance bridges.
     const STEP_M: f64 = 0.02;
     const REACH: f64 = 3.0;
-    let Some(std) = views.first().map(|s| s.std) else { return 0.0 };
-    let steps = (REACH * clip.grip_std_m / STEP_M).round() as i32;
-    let widest = views.iter().map(|s| s.hand).fold(0.0, f64::max);
+    let of_sort = || views.iter().filter(|s| s.view.lost == lost);
+    let Some(std) = of_sort().map(|s| s.std).next() else { return 0.0 };
+    let step = STEP_M / lever;
+    let steps = (REACH * std / step).round() as i32;
+    let widest = of_sort().map(|s| s.hand).fold(0.0, f64::max);
     (-steps..=steps)
-        .map(|k| f64::from(k) * STEP_M * std / clip.grip_std_m)
+        .map(|k| f64::from(k) * step)
         // A part is not shut further than shut.
         .filter(|offset| widest + offset > 0.0)
         .map(|offset| {
             let x = offset / std;
-            let seen = super::moved::seen_share(face, Some(rect), joint, &clip.grip, clip.views, offset);
+            let seen = super::moved::seen_share(face, Some(rect), joint, &clip.grip, clip.views, lost, offset);
             (super::moved::log_likelihood(seen) - 0.5 * (TAIL + 1.0) * (x * x / TAIL).ln_1p(), offset)
         })
         .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.abs().total_cmp(&a.1.abs())))

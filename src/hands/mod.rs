@@ -41,6 +41,13 @@ pub struct Trajectory {
     pub ends_seen: [bool; 2],
 }
 
+/// Standard deviation along the motion, metres, of a grip where the hand was seen to take hold or let go, and where it was
+/// lost on the way: about a third of what a drawer or the handle of a door travels.
+#[must_use]
+pub fn grip_std_m(end_seen: bool) -> f64 {
+    if end_seen { 0.03 } else { 0.12 }
+}
+
 fn both_seen() -> [bool; 2] {
     [true; 2]
 }
@@ -86,19 +93,16 @@ impl Trajectory {
         self.end(self.action == Action::Open)
     }
 
-    /// Whether the hand was seen to take hold of the closed part, or to let go of it.
+    /// Whether the hand was seen to take hold of, or to let go of, the part at the closed end.
     #[must_use]
     pub fn closed_end_seen(&self) -> bool {
         self.ends_seen[usize::from(self.action == Action::Close)]
     }
 
-    /// Standard deviation of the closed grip along the motion, metres: a hand's, or that of a hand that was lost on the way.
+    /// The same at the open end.
     #[must_use]
-    pub fn closed_std_m(&self) -> f64 {
-        // About a third of what a drawer or the handle of a door travels.
-        const LOST_M: f64 = 0.12;
-        const SEEN_M: f64 = 0.03;
-        if self.closed_end_seen() { SEEN_M } else { LOST_M }
+    pub fn open_end_seen(&self) -> bool {
+        self.ends_seen[usize::from(self.action == Action::Open)]
     }
 
     /// Where the grip is at the open end of the motion.

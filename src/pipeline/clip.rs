@@ -38,7 +38,7 @@ pub(super) fn follow(recording: &Recording, clip: &Clip, config: &Config) -> Fol
         hands::trajectory(recording, clip, &reading, &config.hands)
     };
     let (closed, open) = hand.found().map_or_else(Default::default, |t| {
-        let open = moved::open_frames(recording, clip, t).into_iter().map(|(frame, _)| frame).collect();
+        let open = moved::open_frames(recording, clip, t).into_iter().map(|f| f.frame).collect();
         (localization::local_frames(recording, clip, t, &config.localization), open)
     });
     Followed { reading, hand, closed, open }
@@ -163,7 +163,7 @@ pub(super) fn infer(
         .iter()
         .map(|c| {
             result.face.as_ref().map_or((0.0, 0), |f| {
-                moved::agreement(f, result.part.as_ref(), &c.joint, &region.grip, trajectory.closed_std_m(), &open)
+                moved::agreement(f, result.part.as_ref(), &c.joint, &region.grip, hands::grip_std_m(trajectory.closed_end_seen()), &open)
             })
         })
         .collect();

@@ -12,7 +12,7 @@ use crate::config::Config;
 use crate::geometry::moved::Rect;
 use crate::geometry::openings::{self, OpenState, Opening};
 use crate::geometry::{AxisCandidate, Face, candidates, moved};
-use crate::hands::Trajectory;
+use crate::hands::{self, Trajectory};
 use crate::inference::{self, aggregate};
 use crate::math::Point;
 use crate::reasoning::{Answer, Question, Reasoner};
@@ -149,7 +149,7 @@ fn merge_group(
                     contexts
                         .iter()
                         .map(|(f, rect, grip)| {
-                            moved::agreement(f, rect.as_ref(), &k.joint, grip, trajectory.closed_std_m(), &open)
+                            moved::agreement(f, rect.as_ref(), &k.joint, grip, hands::grip_std_m(trajectory.closed_end_seen()), &open)
                         })
                         // A share of few points is noise.
                         .max_by(|a, b| {
@@ -258,7 +258,7 @@ fn refitted<'a>(
     let states: Vec<OpenState> = shown
         .iter()
         .zip(&views)
-        .map(|((_, t), views)| OpenState { grip: t.closed_grip(), grip_std_m: t.closed_std_m(), views })
+        .map(|((_, t), views)| OpenState { grip: t.closed_grip(), grip_std_m: hands::grip_std_m(t.closed_end_seen()), views })
         .collect();
     let fit = openings::refit(face, rect, joint, &states, &noise)?;
     let ends: Vec<Opening> = shown
@@ -273,20 +273,32 @@ fn refitted<'a>(
     Some(Refitted { joint: fit.joint, views, openings, position_std_m: fit.position_std_m, ranges })
 }
 
-/// Opening at the open end of a clip: what the views show where the hand was at least four fifths of its way, as much as they
-/// are sure of it.
+/// Opening at the open end of a clip. After the hand let go the part stands there: what those views show counts, else what is
+/// seen while the hand holds it, brought to the end of the hand's way.
 fn open_end(joint: &Articulation, trajectory: &Trajectory, state: &OpenState, seen: &[Opening]) -> Opening {
     let told = moved::told(joint, &state.grip, state.views);
     let end = joint.opening_at(&state.grip, &trajectory.open_grip());
-    let (mut sum, mut total) = (0.0, 0.0);
-    for (opening, told) in seen.iter().zip(&told).filter(|(_, told)| **told > 0.8 * end) {
-        let weight = 1.0 / (opening.std * opening.std);
-        sum += weight * (opening.value - told);
-        total += weight;
-    }
-    // The views share the hand's and the depth's errors: together they are as sure as the surest of them.
-    let std = seen.iter().map(|o| o.std).fold(f64::INFINITY, f64::min);
-    Opening { value: if total > 0.0 { end + sum / total } else { end }, std }
+    let mean = |of: &dyn Fn(usize) -> Option<f64>| -> Option<f64> {
+        let (mut sum, mut total) = (0.0, 0.0);
+        for (i, opening) in seen.iter().enumerate() {
+            let weight = 1.0 / (opening.std * opening.std);
+            if let Some(value) = of(i) {
+                sum += weight * value;
+                total += weight;
+            }
+        }
+        (total > 0.0).then(|| sum / total)
+    };
+    let after = mean(&|i| (state.views[i].lost && seen[i].informed).then_some(seen[i].value));
+    let during = mean(&|i| (!state.views[i].lost && told[i] > 0.8 * end).then(|| seen[i].value - told[i]));
+    let value = after.or(during.map(|offset| end + offset)).unwrap_or(end);
+    // The views share the hand's and the depth's errors: together they are as sure as the surest of them. A hand that was lost
+    // and a part that nobody saw afterwards leave the end open.
+    let surest = seen.iter().map(|o| o.std).fold(f64::INFINITY, f64::min);
+    let lever = if joint.kind == JointKind::Revolute { joint.line().distance(&state.grip).max(0.1) } else { 1.0 };
+    let unseen = after.is_none() && !trajectory.open_end_seen();
+    let std = if unseen { surest.hypot(hands::grip_std_m(false) / lever) } else { surest };
+    Opening { value, std, informed: !unseen }
 }
 
 /// A part stays where it was left: the open end of a clip is where the next clip of the part finds it. Both clips' values
