@@ -58,8 +58,29 @@ pub struct View<'a> {
     factor: f64,
     /// Where the hand holds the part, world.
     pub grip: Point,
-    /// The hand was gone by then and not seen to let go: the part may have moved on.
-    pub lost: bool,
+    /// What ties the part's place to the hand.
+    pub hold: Hold,
+}
+
+/// What ties the part's place in a view to the hand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Hold {
+    /// The hand holds the part, or was seen to let go of it.
+    Sure,
+    /// The hand is gone and was not seen to let go: the part may be on its way.
+    Lost,
+    /// The same after the narration's end (or before its start): the part stands.
+    Left,
+}
+
+impl Hold {
+    /// All of them.
+    pub(super) const ALL: [Self; 3] = [Self::Sure, Self::Lost, Self::Left];
+
+    /// What a grip of `grip_std_m` is worth in such a view, metres.
+    pub(super) fn std_m(self, grip_std_m: f64) -> f64 {
+        if self == Self::Sure { grip_std_m } else { grip_std_m.hypot(crate::hands::grip_std_m(false)) }
+    }
 }
 
 /// A leaf seen at less than this slant (cosine) shows its edge.
@@ -89,8 +110,8 @@ pub struct OpenFrame {
     pub frame: usize,
     /// See [`View::grip`].
     pub grip: Point,
-    /// See [`View::lost`].
-    pub lost: bool,
+    /// See [`View::hold`].
+    pub hold: Hold,
 }
 
 /// Frames of the open state, with the grip where the hand holds the part in them: while the hand holds it far from closed,
@@ -105,7 +126,7 @@ pub fn open_frames(recording: &Recording, clip: &Clip, trajectory: &Trajectory) 
     let far: Vec<_> = trajectory.samples.iter().filter(|s| travel(&s.smoothed) > 0.5 * furthest).collect();
     let mut frames: Vec<OpenFrame> = (0..far.len().min(HELD))
         .map(|i| far[i * far.len() / far.len().min(HELD)])
-        .map(|sample| OpenFrame { frame: sample.frame, grip: sample.smoothed, lost: false })
+        .map(|sample| OpenFrame { frame: sample.frame, grip: sample.smoothed, hold: Hold::Sure })
         .collect();
     // Once let go the part stays where it was left, until the next clip moves something.
     let [first, last] = trajectory.contact_frames();
@@ -115,14 +136,28 @@ pub fn open_frames(recording: &Recording, clip: &Clip, trajectory: &Trajectory) 
             .iter()
             .any(|c| c.clip != clip.clip && c.end_frame > c.start_frame && (c.start_frame..=c.end_frame).contains(&f))
     };
-    let free: Vec<usize> = match trajectory.action {
-        Action::Open => (last + 1..recording.frames.len()).take_while(|f| !in_other_clip(*f)).take(4 * FREE).collect(),
-        Action::Close => (0..first).rev().take_while(|f| !in_other_clip(*f)).take(4 * FREE).collect(),
-    };
     let grip = trajectory.open_grip();
-    let lost = !trajectory.open_end_seen();
-    let count = free.len().min(FREE);
-    frames.extend((0..count).map(|i| OpenFrame { frame: free[i * free.len() / count], grip, lost }));
+    let mut after = |from: usize, hold: Hold| {
+        let free: Vec<usize> = match trajectory.action {
+            Action::Open => {
+                (from + 1..recording.frames.len()).take_while(|f| !in_other_clip(*f)).take(4 * FREE).collect()
+            }
+            Action::Close => (0..from).rev().take_while(|f| !in_other_clip(*f)).take(4 * FREE).collect(),
+        };
+        let count = free.len().min(FREE);
+        frames.extend((0..count).map(|i| OpenFrame { frame: free[i * free.len() / count], grip, hold }));
+    };
+    let end = if trajectory.action == Action::Open { last } else { first };
+    if trajectory.open_end_seen() {
+        after(end, Hold::Sure);
+    } else {
+        // A hand that was lost may have moved the part until the narration ends.
+        after(end, Hold::Lost);
+        after(
+            if trajectory.action == Action::Open { last.max(clip.end_frame) } else { first.min(clip.start_frame) },
+            Hold::Left,
+        );
+    }
     frames
 }
 
@@ -136,7 +171,7 @@ pub fn open_views<'a>(
 ) -> Vec<View<'a>> {
     open_frames(recording, clip, trajectory)
         .into_iter()
-        .filter_map(|OpenFrame { frame, grip, lost }| {
+        .filter_map(|OpenFrame { frame, grip, hold }| {
             let world_from_camera = recording.frames[frame].world_from_camera;
             Some(View {
                 camera_from_world: world_from_camera.inverse(),
@@ -145,7 +180,7 @@ pub fn open_views<'a>(
                 sketch: sketches.get(&frame)?,
                 factor: recording.depth_factor(frame),
                 grip,
-                lost,
+                hold,
             })
         })
         .collect()
@@ -175,14 +210,15 @@ pub fn agreement(
         JointKind::Revolute => joint.line().distance(grip).max(0.05),
     };
     // Where a hand was lost before it let go, the views after that have an offset of their own.
-    let of = |lost: bool, std_m: f64| -> (f64, usize) {
+    let of = |hold: Hold| -> (f64, usize) {
+        let std_m = hold.std_m(grip_std_m);
         // Two standard deviations to each side.
         let reach = (2.0 * std_m / STEP_M).round() as i32;
         (0..=2 * reach)
             // From the middle outwards: of equal offsets the smallest is kept.
             .map(|k| f64::from(if k % 2 == 0 { -k / 2 } else { k / 2 + 1 }) * STEP_M)
             .map(|offset| {
-                let (share, count) = seen_share(face, rect, joint, grip, views, lost, offset / lever);
+                let (share, count) = seen_share(face, rect, joint, grip, views, hold, offset / lever);
                 ((share - SHARE_PER_NAT * 0.5 * (offset / std_m).powi(2)).max(0.0), count)
             })
             // An offset under which nothing moves clearly explains nothing.
@@ -191,13 +227,13 @@ pub fn agreement(
                 if better == Some(Ordering::Greater) || best.1 == 0 { a } else { best }
             })
     };
-    let held = of(false, grip_std_m);
-    if !views.iter().any(|v| v.lost) {
-        return held;
+    let (mut explained, mut count) = (0.0, 0);
+    for hold in Hold::ALL.into_iter().filter(|h| views.iter().any(|v| v.hold == *h)) {
+        let (share, points) = of(hold);
+        explained += share * points as f64;
+        count += points;
     }
-    let after = of(true, grip_std_m.hypot(crate::hands::grip_std_m(false)));
-    let count = held.1 + after.1;
-    ((held.0 * held.1 as f64 + after.0 * after.1 as f64) / count.max(1) as f64, count)
+    (explained / count.max(1) as f64, count)
 }
 
 /// What [`agreement`] is worth, in nats: of the points that a right joint moves about four fifths are seen in their place, of
@@ -222,7 +258,7 @@ pub(super) fn seen_share(
     joint: &Articulation,
     grip: &Point,
     views: &[View],
-    lost: bool,
+    hold: Hold,
     offset: f64,
 ) -> (f64, usize) {
     // Without a known part, a piece of its face around the grip that the smallest front has.
@@ -230,7 +266,7 @@ pub(super) fn seen_share(
     const STEPS: usize = 12;
     let bounds = rect.map_or([[-HALF_M, HALF_M]; 2], |r| r.bounds);
     let (mut explained, mut count) = (0usize, 0usize);
-    for view in views.iter().filter(|v| v.lost == lost) {
+    for view in views.iter().filter(|v| v.hold == hold) {
         let motion = joint.motion(joint.opening_at(grip, &view.grip) + offset);
         let back = motion.inverse();
         for i in 0..STEPS * STEPS {

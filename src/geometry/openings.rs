@@ -7,7 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::Face;
-use super::moved::{Rect, View};
+use super::moved::{Hold, Rect, View};
 use crate::articulation::{Articulation, JointKind};
 use crate::math::{Point, Vector, any_orthogonal, reject, unit};
 
@@ -91,8 +91,7 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
             clip.views
                 .iter()
                 .map(|view| {
-                    let lost = if view.lost { crate::hands::grip_std_m(false) } else { 0.0 };
-                    let std = clip.grip_std_m.hypot(lost) / lever(clip);
+                    let std = view.hold.std_m(clip.grip_std_m) / lever(clip);
                     Seen { view, hand: joint.opening_at(&clip.grip, &view.grip), std }
                 })
                 .collect()
@@ -105,8 +104,8 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
         .iter()
         .zip(clips)
         .map(|(views, clip)| {
-            let [held, after] = [false, true].map(|lost| coarse(face, rect, joint, clip, views, lost, lever(clip)));
-            views.iter().map(|s| if s.view.lost { after } else { held }).collect()
+            let of = Hold::ALL.map(|hold| coarse(face, rect, joint, clip, views, hold, lever(clip)));
+            views.iter().map(|s| of[s.view.hold as usize]).collect()
         })
         .collect();
     let mut shift = [0.0; 2];
@@ -239,13 +238,13 @@ fn coarse(
     joint: &Articulation,
     clip: &OpenState,
     views: &[Seen],
-    lost: bool,
+    hold: Hold,
     lever: f64,
 ) -> f64 {
     // Two centimetres at the grip, which the depth's tolerance bridges.
     const STEP_M: f64 = 0.02;
     const REACH: f64 = 3.0;
-    let of_sort = || views.iter().filter(|s| s.view.lost == lost);
+    let of_sort = || views.iter().filter(|s| s.view.hold == hold);
     let Some(std) = of_sort().map(|s| s.std).next() else { return 0.0 };
     let step = STEP_M / lever;
     let steps = (REACH * std / step).round() as i32;
@@ -256,7 +255,7 @@ fn coarse(
         .filter(|offset| widest + offset > 0.0)
         .map(|offset| {
             let x = offset / std;
-            let seen = super::moved::seen_share(face, Some(rect), joint, &clip.grip, clip.views, lost, offset);
+            let seen = super::moved::seen_share(face, Some(rect), joint, &clip.grip, clip.views, hold, offset);
             (super::moved::log_likelihood(seen) - 0.5 * (TAIL + 1.0) * (x * x / TAIL).ln_1p(), offset)
         })
         .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.abs().total_cmp(&a.1.abs())))

@@ -9,7 +9,7 @@ use super::clip::{self, part_shape};
 use super::{ClipResult, SceneJoint};
 use crate::articulation::{Action, Articulation, JointKind};
 use crate::config::Config;
-use crate::geometry::moved::Rect;
+use crate::geometry::moved::{Hold, Rect};
 use crate::geometry::openings::{self, OpenState, Opening};
 use crate::geometry::{AxisCandidate, Face, candidates, moved};
 use crate::hands::{self, Trajectory};
@@ -289,8 +289,9 @@ fn open_end(joint: &Articulation, trajectory: &Trajectory, state: &OpenState, se
         }
         (total > 0.0).then(|| sum / total)
     };
-    let after = mean(&|i| (state.views[i].lost && seen[i].informed).then_some(seen[i].value));
-    let during = mean(&|i| (!state.views[i].lost && told[i] > 0.8 * end).then(|| seen[i].value - told[i]));
+    let of = |hold: Hold| mean(&|i| (state.views[i].hold == hold && seen[i].informed).then_some(seen[i].value));
+    let after = of(Hold::Left).or(of(Hold::Lost));
+    let during = mean(&|i| (state.views[i].hold == Hold::Sure && told[i] > 0.8 * end).then(|| seen[i].value - told[i]));
     let value = after.or(during.map(|offset| end + offset)).unwrap_or(end);
     // The views share the hand's and the depth's errors: together they are as sure as the surest of them. A hand that was lost
     // and a part that nobody saw afterwards leave the end open.
