@@ -163,7 +163,14 @@ pub(super) fn infer(
         .iter()
         .map(|c| {
             result.face.as_ref().map_or((0.0, 0), |f| {
-                moved::agreement(f, result.part.as_ref(), &c.joint, &region.grip, hands::grip_std_m(trajectory.closed_end_seen()), &open)
+                moved::agreement(
+                    f,
+                    result.part.as_ref(),
+                    &c.joint,
+                    &region.grip,
+                    hands::grip_std_m(trajectory.closed_end_seen()),
+                    &open,
+                )
             })
         })
         .collect();
@@ -175,6 +182,8 @@ pub(super) fn infer(
         candidates: &result.candidates,
         agreement: &agreement,
         part: result.part.as_ref().map(part_shape),
+        face: result.face.as_ref(),
+        up: recording.up(),
     });
     let face = result.face.as_ref();
     result.joint = match config.inference.method {

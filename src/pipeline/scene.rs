@@ -149,7 +149,14 @@ fn merge_group(
                     contexts
                         .iter()
                         .map(|(f, rect, grip)| {
-                            moved::agreement(f, rect.as_ref(), &k.joint, grip, hands::grip_std_m(trajectory.closed_end_seen()), &open)
+                            moved::agreement(
+                                f,
+                                rect.as_ref(),
+                                &k.joint,
+                                grip,
+                                hands::grip_std_m(trajectory.closed_end_seen()),
+                                &open,
+                            )
                         })
                         // A share of few points is noise.
                         .max_by(|a, b| {
@@ -167,6 +174,8 @@ fn merge_group(
                 candidates: &pooled,
                 agreement: &agreement,
                 part: clips[best].part.as_ref().map(part_shape),
+                face: face.as_ref(),
+                up: recording.up(),
             }));
         }
         let answer = Answer::together(&answers)?;
@@ -258,7 +267,11 @@ fn refitted<'a>(
     let states: Vec<OpenState> = shown
         .iter()
         .zip(&views)
-        .map(|((_, t), views)| OpenState { grip: t.closed_grip(), grip_std_m: hands::grip_std_m(t.closed_end_seen()), views })
+        .map(|((_, t), views)| OpenState {
+            grip: t.closed_grip(),
+            grip_std_m: hands::grip_std_m(t.closed_end_seen()),
+            views,
+        })
         .collect();
     let fit = openings::refit(face, rect, joint, &states, &noise)?;
     let ends: Vec<Opening> = shown

@@ -6,8 +6,8 @@
 
 use crate::articulation::JointKind;
 use crate::config;
-use crate::geometry::{AxisCandidate, AxisSource, HingeSide, moved};
-use crate::math::path;
+use crate::geometry::{AxisCandidate, AxisSource, Face, HingeSide, moved};
+use crate::math::{Vector, path};
 
 use super::words::line_factor;
 use super::{Answer, PartShape, Question, Reasoner};
@@ -87,6 +87,7 @@ impl Geometric {
 /// times as likely to hold the hinge as three), times that of its place on the part.
 fn log_priors(question: &Question) -> Vec<f64> {
     let candidates = question.candidates;
+    let is_lid = question.face.is_some_and(|face| face.is_horizontal(&question.up));
     // Lines that are long and seen often are edges of furniture rather than of its texture, and lines that a language model
     // takes for hinges rather than others.
     let raw = |c: &AxisCandidate| match c.source {
@@ -96,13 +97,57 @@ fn log_priors(question: &Question) -> Vec<f64> {
     candidates
         .iter()
         .map(|c| {
-            let same = |o: &&AxisCandidate| o.source == c.source && o.joint.kind == c.joint.kind;
+            let class = |o: &AxisCandidate| question.face.and_then(|face| slide_class(o, face, &question.up));
+            let own = class(c);
+            let same = |o: &&AxisCandidate| {
+                o.joint.kind == c.joint.kind && if own.is_some() { class(o) == own } else { o.source == c.source }
+            };
             let total: f64 = candidates.iter().filter(same).map(raw).sum();
             let share = (raw(c) / total.max(1e-12)).ln();
-            source_prior(c.source).ln() + share - 0.5 * c.shift * c.shift
-                + question.part.map_or(0.0, |part| shape_log_prior(c, &part))
+            own.map_or_else(|| source_prior(c.source), slide_prior).ln() + share - 0.5 * c.shift * c.shift
+                + question.part.map_or(0.0, |part| shape_log_prior(c, &part, is_lid))
         })
         .collect()
+}
+
+/// How a slide lies to the touched face.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum SlideClass {
+    /// Straight out of a front.
+    Out,
+    /// Along a front, to the side.
+    Aside,
+    /// Along a front, up or down.
+    Lift,
+    /// In the plane of a lid or a worktop, or out of it.
+    Level,
+    /// Anything else.
+    Askew,
+}
+
+/// The class of a slide; `None` for hinges.
+fn slide_class(candidate: &AxisCandidate, face: &Face, up: &Vector) -> Option<SlideClass> {
+    let axis = candidate.joint.axis;
+    let near = |d: &Vector| axis.dot(d).abs() > 0.94;
+    (candidate.joint.kind == JointKind::Prismatic).then(|| match () {
+        () if face.is_horizontal(up) => SlideClass::Level,
+        () if near(&face.normal) => SlideClass::Out,
+        () if near(&face.right) => SlideClass::Aside,
+        () if near(&face.up) => SlideClass::Lift,
+        () => SlideClass::Askew,
+    })
+}
+
+/// What furniture does: drawers come straight out, some doors slide aside, next to nothing is lifted along its front or
+/// slides where a lid is.
+fn slide_prior(class: SlideClass) -> f64 {
+    match class {
+        SlideClass::Out => 0.8,
+        SlideClass::Aside => 0.1,
+        SlideClass::Level => 0.06,
+        SlideClass::Askew => 0.04,
+        SlideClass::Lift => 0.02,
+    }
 }
 
 fn source_prior(source: AxisSource) -> f64 {
@@ -121,7 +166,7 @@ fn source_prior(source: AxisSource) -> f64 {
 }
 
 /// Where the grip sits and how wide the front is, under each kind of joint.
-fn shape_log_prior(candidate: &AxisCandidate, part: &PartShape) -> f64 {
+fn shape_log_prior(candidate: &AxisCandidate, part: &PartShape, is_lid: bool) -> f64 {
     // Furniture that follows no habit, and parts that are localised wrongly.
     const FLOOR: f64 = 0.35;
     let gauss = |x: f64, mean: f64, std: f64| (-0.5 * ((x - mean) / std).powi(2)).exp();
@@ -138,11 +183,14 @@ fn shape_log_prior(candidate: &AxisCandidate, part: &PartShape) -> f64 {
         (_, Some(HingeSide::Top)) => (gauss(up, -EDGE, 0.12), 0.5),
         (_, None) => return 0.0,
     };
-    let side: f64 = match candidate.side {
-        Some(HingeSide::Left | HingeSide::Right) => 0.34,
-        Some(HingeSide::Bottom) => 0.2,
-        Some(HingeSide::Top) => 0.12,
-        None => 1.0,
+    // A lid turns about its far edge; `up` on a level face points away from the person.
+    let side: f64 = match (candidate.side, is_lid) {
+        (Some(HingeSide::Top), true) => 0.7,
+        (Some(_), true) => 0.1,
+        (Some(HingeSide::Left | HingeSide::Right), false) => 0.34,
+        (Some(HingeSide::Bottom), false) => 0.2,
+        (Some(HingeSide::Top), false) => 0.12,
+        (None, _) => 1.0,
     };
     // A hinge at the part's own edge: the distance from the grip is the part's extent from there.
     side.ln() + (FLOOR + (1.0 - FLOOR) * grip).ln() + (FLOOR + (1.0 - FLOOR) * shape).ln()
@@ -152,7 +200,7 @@ fn shape_log_prior(candidate: &AxisCandidate, part: &PartShape) -> f64 {
 mod tests {
     use super::*;
     use crate::articulation::Articulation;
-    use crate::math::{Point, Vector};
+    use crate::math::Point;
     use crate::recording::narration::Reading;
 
     fn candidate(kind: JointKind, axis: Vector, origin: Point, source: AxisSource) -> AxisCandidate {
@@ -179,6 +227,8 @@ mod tests {
                 candidates,
                 agreement,
                 part: None,
+                face: None,
+                up: Vector::z(),
             })
             .revolute_probability(candidates)
     }
@@ -233,6 +283,8 @@ mod tests {
                 candidates: &candidates,
                 agreement: &[],
                 part: None,
+                face: None,
+                up: Vector::z(),
             })
         };
         let (before, after) = (priors(0.0), priors(1.0));

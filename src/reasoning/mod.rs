@@ -15,8 +15,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::articulation::JointKind;
 use crate::error::Result;
-use crate::geometry::AxisCandidate;
-use crate::math::Point;
+use crate::geometry::{AxisCandidate, Face};
+use crate::math::{Point, Vector};
 use crate::recording::narration::Reading;
 
 /// What is known when the questions are asked.
@@ -37,6 +37,10 @@ pub struct Question<'a> {
     pub agreement: &'a [(f64, usize)],
     /// Width and height of the moving part and the grip's place in it (-0.5..0.5 to the right and up), where known.
     pub part: Option<PartShape>,
+    /// The touched face, where one was found.
+    pub face: Option<&'a Face>,
+    /// Against gravity, unit.
+    pub up: Vector,
 }
 
 /// Shape of the moving part's front and where it is held.
