@@ -27,14 +27,14 @@ pub struct Threshold {
 }
 
 /// By rising score.
-fn ordered(scores: &[Scored]) -> Vec<&Scored> {
-    let mut ordered: Vec<&Scored> = scores.iter().filter(|s| !s.score.is_nan()).collect();
+fn ordered(scores: &[Scored]) -> Vec<Scored> {
+    let mut ordered: Vec<Scored> = scores.iter().filter(|s| !s.score.is_nan()).copied().collect();
     ordered.sort_by(|a, b| a.score.total_cmp(&b.score));
     ordered
 }
 
 /// The probability that a right joint scores above a wrong one, ties counting half, where each joint counts `weight` times.
-fn area(ordered: &[&Scored], weight: impl Fn(usize) -> f64) -> Option<f64> {
+fn area(ordered: &[Scored], weight: impl Fn(usize) -> f64) -> Option<f64> {
     let (mut pairs, mut right, mut wrong) = (0.0, 0.0, 0.0);
     for tied in ordered.chunk_by(|a, b| a.score == b.score) {
         let sum = |is: bool| tied.iter().filter(|s| s.right == is).map(|s| weight(s.cluster)).sum::<f64>();
@@ -56,16 +56,20 @@ pub fn auc(scores: &[Scored]) -> Option<f64> {
 /// 95 % interval of [`auc`]: clusters are drawn with replacement, a thousand times. `None` for fewer than two clusters.
 #[must_use]
 pub fn auc_interval(scores: &[Scored]) -> Option<Interval> {
-    let ordered = ordered(scores);
+    let mut ordered = ordered(scores);
     let mut clusters: Vec<usize> = ordered.iter().map(|s| s.cluster).collect();
     clusters.sort_unstable();
     clusters.dedup();
+    // From here on numbered without gaps.
+    for s in &mut ordered {
+        s.cluster = clusters.partition_point(|c| *c < s.cluster);
+    }
     drawn(clusters.len(), |draw| {
         let mut weights = vec![0.0; clusters.len()];
         for &i in draw {
             weights[i] += 1.0;
         }
-        area(&ordered, |cluster| clusters.binary_search(&cluster).map_or(0.0, |i| weights[i]))
+        area(&ordered, |cluster| weights[cluster])
     })
 }
 
