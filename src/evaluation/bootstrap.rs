@@ -46,22 +46,32 @@ impl Interval {
 /// Where all clips agree the interval has no width, although the truth is less sure than that.
 #[must_use]
 pub fn interval(clusters: &[Cluster]) -> Option<Interval> {
-    if clusters.len() < 2 {
+    drawn(clusters.len(), |draw| {
+        let (mut sum, mut clips) = (0.0, 0);
+        for &i in draw {
+            sum += clusters[i].sum;
+            clips += clusters[i].clips;
+        }
+        Some(sum / clips.max(1) as f64)
+    })
+}
+
+/// The percentile interval of any statistic of `count` clusters: it is given the indices of a draw, with replacement, and
+/// may have no value for some of them. `None` for fewer than two clusters, and where no draw has a value.
+pub(super) fn drawn(count: usize, statistic: impl Fn(&[usize]) -> Option<f64>) -> Option<Interval> {
+    if count < 2 {
         return None;
     }
     let mut rng = Pcg64Mcg::seed_from_u64(SEED);
-    let means: Vec<f64> = (0..DRAWS)
-        .map(|_| {
-            let (mut sum, mut clips) = (0.0, 0);
-            for _ in 0..clusters.len() {
-                let drawn = clusters[rng.random_range(0..clusters.len())];
-                sum += drawn.sum;
-                clips += drawn.clips;
-            }
-            sum / clips.max(1) as f64
-        })
-        .collect();
-    let [low, high] = TAILS.map(|q| stats::quantile(&means, q));
+    let mut draw = vec![0; count];
+    let mut values = Vec::with_capacity(DRAWS);
+    for _ in 0..DRAWS {
+        for index in &mut draw {
+            *index = rng.random_range(0..count);
+        }
+        values.extend(statistic(&draw));
+    }
+    let [low, high] = TAILS.map(|q| stats::quantile(&values, q));
     Some(Interval { low: low?, high: high? })
 }
 

@@ -3,9 +3,11 @@
 pub mod bootstrap;
 pub mod calibration;
 pub mod deviations;
+pub mod discrimination;
 pub mod failures;
 pub mod paired;
 pub mod rules;
+pub mod siblings;
 pub mod stages;
 pub mod summary;
 pub mod truth;

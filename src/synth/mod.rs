@@ -257,6 +257,12 @@ impl Recorded {
         Ok(Self { options: *options, kitchen, take, seen, camera, up, has_masks: !changes.no_masks })
     }
 
+    /// The kitchen as it really is, everything closed. Never an input of the pipeline.
+    #[must_use]
+    pub fn kitchen(&self) -> &kitchen::Kitchen {
+        &self.kitchen
+    }
+
     /// Number of frames.
     #[must_use]
     pub fn frames(&self) -> usize {
