@@ -5,11 +5,13 @@
 # 1000 on are for reports only, and no value may be chosen by what comes out on them. 20 kitchens are 240 clips.
 #   PAWS_SYNTH="--few-hands 3"  more options of `paws synth`: --hand-noise, --depth-bias, --word-error, --clips-per-part, ...
 #   PAWS_REPORT=FILE            the whole report as JSON, too
+#   PAWS_EVALUATE="--details"   more options of `paws evaluate`: groups, errors, part boxes, calibration
 # Images are deleted as soon as a kitchen is done: about 60 MB of disk at a time.
 set -euo pipefail
 tier=${1:?"a tier: t0 t1 t2 hd t3 short nonm"} first=${2:-1} count=${3:-20} config=${4:-ours}
 report=${PAWS_REPORT:+$(realpath -m "$PAWS_REPORT")}
 read -r -a extra <<<"${PAWS_SYNTH:-}"
+read -r -a asked <<<"${PAWS_EVALUATE:-}"
 method=()
 if [ -f "$config" ]; then
   method=(--config "$(realpath "$config")")
@@ -38,4 +40,4 @@ import json, sys
 rows = [row for name in sys.argv[1:] for row in json.load(open(name + ".json"))["predictions"]]
 json.dump({"predictions": rows}, sys.stdout)
 MERGE
-"$paws" evaluate predictions.json "${recordings[@]}" ${report:+--json "$report"}
+"$paws" evaluate predictions.json "${recordings[@]}" "${asked[@]}" ${report:+--json "$report"}

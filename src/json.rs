@@ -59,7 +59,10 @@ pub fn read<T: DeserializeOwned>(path: &Path) -> Result<T> {
             let digits: String = text[at + 8..].trim_start().chars().take_while(char::is_ascii_digit).collect();
             format!(", frame {digits}")
         });
-        Error::format(path, format!("line {}, column {}{frame}", e.line(), e.column()), format!("{e}{hint}"))
+        // The parser says the place too, behind its message.
+        let said = e.to_string();
+        let message = said.split(" at line ").next().unwrap_or(&said);
+        Error::format(path, format!("line {}, column {}{frame}", e.line(), e.column()), format!("{message}{hint}"))
     })
 }
 

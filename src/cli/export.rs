@@ -43,6 +43,9 @@ pub struct ExportArgs {
 /// Reads a twin from its file or folder.
 pub fn read_twin(path: &Path) -> anyhow::Result<Twin> {
     let file = if path.is_dir() { path.join("twin.json") } else { path.to_owned() };
+    if path.is_dir() && !file.exists() {
+        bail!("{}: no such file; a folder that `paws twin` wrote has one", shown(&file));
+    }
     Ok(json::read(&file)?)
 }
 

@@ -68,6 +68,9 @@ pub fn is_model(path: &Path) -> bool {
 
 /// The model as a twin with the hands of its joints, in the twin's order; what was decided on the way is told.
 pub fn load(path: &Path, args: &ForeignArgs) -> anyhow::Result<(Twin, Vec<JointHands>)> {
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb") || e.eq_ignore_ascii_case("usda")) {
+        bail!("{}: cannot be simulated here; give the model as URDF or MJCF", shown(path));
+    }
     let model = model::read(path)?;
     let (twin, notes) = furniture::to_twin(&model);
     for note in &notes {

@@ -36,6 +36,12 @@ pub struct InferArgs {
 
 pub fn run(args: &InferArgs) -> anyhow::Result<Answer> {
     let config = args.config.read()?;
+    if let Some(missing) = args.inputs.iter().find(|p| !p.exists()) {
+        bail!(
+            "{}: no such file or folder; give recordings (folders) or bare trajectories (files of x y z)",
+            shown(missing)
+        );
+    }
     let (folders, trajectories): (Vec<&PathBuf>, Vec<&PathBuf>) = args.inputs.iter().partition(|p| !p.is_file());
     if !folders.is_empty() && !trajectories.is_empty() {
         bail!("give recordings (folders) or bare trajectories (files), not both at once");

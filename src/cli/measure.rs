@@ -52,7 +52,7 @@ pub fn run(args: &MeasureArgs) -> anyhow::Result<Answer> {
         all.push(stages);
     }
     steps.finish();
-    rows.push(row(&format!("{} recordings", all.len()), &Stages::pooled(&all)));
+    rows.push(row(&format!("all ({})", all.len()), &Stages::pooled(&all)));
     print(&aligned(&rows))?;
     if let Some(path) = &args.json {
         write_file(path, json::text(&all)?)?;

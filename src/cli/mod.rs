@@ -50,21 +50,21 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Make a twin from an embedded example and say where to look
+    /// Render a recording of a kitchen, make its twin and say where to look
     Demo(demo::DemoArgs),
     /// Make a simulated, validated twin from a recording
     Twin(twin::TwinArgs),
     /// Infer joints from recordings, or from a bare trajectory
     Infer(infer::InferArgs),
-    /// Write a twin, or joints found elsewhere, as URDF, MJCF, glTF and USD
+    /// Write a twin, or joints that another program found, as URDF, MJCF, glTF and USD
     Export(export::ExportArgs),
-    /// Check what a file alone tells of a model's fitness for simulation: anybody's URDF, MJCF or GLB
+    /// Check a model without simulating it: limits, masses, names, collisions of anybody's URDF, MJCF or GLB
     Check(check::CheckArgs),
-    /// Simulate a twin's, or anybody's model's, joints against recorded hands
+    /// Replay recorded hands on the joints of a twin, or of anybody's URDF or MJCF, in a physics engine
     Validate(validate::ValidateArgs),
     /// Compare predictions with the truth
     Evaluate(evaluate::EvaluateArgs),
-    /// Compare configurations on recordings with a truth
+    /// Compare configurations on recordings with a truth: what each choice is worth
     Ablate(ablate::AblateArgs),
     /// Measure the steps before the joint inference on recordings with a truth
     Measure(measure::MeasureArgs),

@@ -49,7 +49,11 @@ impl Steps {
     fn close(&self, step: &str) {
         if let (Ok(mut times), Ok(mut started)) = (self.times.lock(), self.started.lock()) {
             if !step.is_empty() {
-                times.push((step.to_owned(), started.elapsed()));
+                // A step that comes twice is told once.
+                match times.iter().position(|(name, _)| name == step) {
+                    Some(i) => times[i].1 += started.elapsed(),
+                    None => times.push((step.to_owned(), started.elapsed())),
+                }
             }
             *started = Instant::now();
         }

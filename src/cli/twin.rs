@@ -145,7 +145,7 @@ pub fn make(
     }
     output.write("trajectories.json", json::text(&hands)?)?;
     output.write("config.toml", config.to_toml())?;
-    let command = format!("paws twin {} --out {}", recording.name, shown(out));
+    let command = format!("paws twin {} --out {}", shown(&recording.dir), shown(out));
     let notes: Vec<FileNote> = FILES.iter().filter(|f| keep_steps || f.name != "steps/").cloned().collect();
     output.write("index.html", page::render(&scene, &twin, &validation, &glb, &command, &notes)?)?;
     if keep_steps {

@@ -46,7 +46,7 @@ pub fn run(args: &ValidateArgs) -> anyhow::Result<Answer> {
         "peak force",
         "reached",
         "observed",
-        "deepest",
+        "deepest contact",
         "best rival",
     ];
     let mut rows = vec![header.map(str::to_owned).to_vec()];
@@ -69,8 +69,8 @@ pub fn run(args: &ValidateArgs) -> anyhow::Result<Answer> {
                 c.rival.as_ref().map_or("-".to_owned(), |r| format!("{} {}", r.name, words::centimetres(r.rms_m))),
             ]);
         }
-        let margin = words::margin(check.margin_nats);
-        verdicts += &format!("{}: {} ({margin}), {}\n", check.id, check.verdict.word(), check.reason);
+        let odds = check.margin_nats.map_or(String::new(), |nats| format!(" ({})", words::margin(Some(nats))));
+        verdicts += &format!("{}: {}{odds}: {}\n", check.id, check.verdict.word(), check.reason);
     }
     print(&aligned(&rows))?;
     print(&format!("\n{verdicts}"))?;
@@ -86,10 +86,18 @@ fn ours(path: &Path) -> anyhow::Result<(Twin, Vec<JointHands>)> {
     let twin = super::export::read_twin(path)?;
     // The same points that every exporter insists on: a broken twin is told before it is simulated.
     crate::export::check(&twin)?;
-    let hands: Vec<JointHands> = json::read(&path.join("trajectories.json"))?;
+    let recorded = path.join("trajectories.json");
+    if !recorded.exists() {
+        anyhow::bail!(
+            "{}: no such file: a twin without a recording (`paws export`) has no hands to replay; validate its scene.urdf with \
+             --trajectory FILE",
+            recorded.display()
+        );
+    }
+    let hands: Vec<JointHands> = json::read(&recorded)?;
     for (name, trajectory) in hands.iter().flat_map(|h| &h.clips) {
         if let Err(fault) = trajectory.check() {
-            anyhow::bail!("{}: clip {name}: {fault}", path.join("trajectories.json").display());
+            anyhow::bail!("{}: clip {name}: {fault}", recorded.display());
         }
     }
     let in_order = twin

@@ -349,7 +349,12 @@ fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
         JointKind::Prismatic => bounds.center,
     };
     let handle = solids.iter().find(|s| s.role == Role::Handle).map_or(plan.joint.grip, |s| s.shape.center);
-    let word = plan.joint.furniture.as_deref().unwrap_or(articulation.kind.word());
+    // What nobody named.
+    let word = plan.joint.furniture.as_deref().unwrap_or(match articulation.kind {
+        JointKind::Revolute => "door",
+        JointKind::Prismatic if limits::comes_out(&plan.articulation, face) => "drawer",
+        JointKind::Prismatic => "sliding door",
+    });
     Furniture {
         name: format!("{id}_base"),
         carcass,

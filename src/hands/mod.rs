@@ -153,10 +153,11 @@ pub fn trajectory(
         return Outcome::Abstained("no hand was detected in the clip".to_owned());
     }
     let Some((_, side, held)) = best.filter(|(_, _, held)| held.len() >= config.min_samples) else {
-        return Outcome::Abstained(format!(
-            "fewer than {} hand samples in contact ({in_clip} hand samples in the clip)",
-            config.min_samples
-        ));
+        let none = match config.min_samples {
+            0 | 1 => "no hand sample".to_owned(),
+            least => format!("fewer than {least} hand samples"),
+        };
+        return Outcome::Abstained(format!("{none} in contact ({in_clip} seen in the clip)"));
     };
     // A blink of the detector; a hand takes as long to reach a handle.
     const SEEN_SECS: f64 = 0.35;

@@ -44,7 +44,11 @@ pub fn read(path: &Path) -> Result<BareTrajectory> {
             Ok(values) => values,
             // A header stands before the first row of numbers.
             Err(_) if columns.is_none() && out.positions.is_empty() && number == 1 => continue,
-            Err(e) => return Err(Error::format(path, place(), format!("\"{text}\": {e}"))),
+            Err(_) => {
+                let start: String = text.chars().take(40).collect();
+                let message = format!("\"{start}\" is not all numbers; expected x y z [qx qy qz qw]");
+                return Err(Error::format(path, place(), message));
+            }
         };
         if ![3, 4, 7, 8].contains(&values.len()) {
             let message = format!(

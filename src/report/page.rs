@@ -29,7 +29,7 @@ struct JointRow {
     kind: &'static str,
     axis: String,
     range: String,
-    source: String,
+    sure: String,
     tracking: String,
     force: String,
     verdict: &'static str,
@@ -72,9 +72,7 @@ pub fn render(
                 kind: f.part.joint.articulation.kind.word(),
                 axis: words::axis(&f.part, joint.and_then(|j| j.face.as_ref())),
                 range: words::amount(f.part.joint.articulation.kind, f.part.joint.upper),
-                source: joint.map_or(String::new(), |j| {
-                    format!("{} clips, type {} sure", j.clips.len(), words::sure(j.type_probability))
-                }),
+                sure: joint.map_or(String::new(), |j| words::sure(j.type_probability)),
                 tracking: words::centimetres(check.rms_m),
                 force: format!("{:.0} N", check.peak_force_n),
                 verdict: check.verdict.word(),

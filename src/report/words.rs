@@ -28,8 +28,14 @@ pub fn margin(nats: Option<f64>) -> String {
     let Some(nats) = nats else { return "-".to_owned() };
     let odds = match nats.abs().exp() {
         odds if odds > MOST => format!("over {MOST:.0}"),
-        odds if odds < 10.0 => format!("{odds:.1}"),
-        odds => format!("{odds:.0}"),
+        odds if odds < 1.05 => "1".to_owned(),
+        odds if odds < 9.95 => format!("{odds:.1}"),
+        odds if odds < 100.0 => format!("{odds:.0}"),
+        // More than two digits are the noise's.
+        odds => {
+            let unit = 10f64.powf(odds.log10().floor() - 1.0);
+            format!("{:.0}", (odds / unit).round() * unit)
+        }
     };
     if nats >= 0.0 { format!("{odds}:1") } else { format!("1:{odds}") }
 }
@@ -40,7 +46,7 @@ pub fn sure(probability: f64) -> String {
     if probability > 0.99 { "over 99 %".to_owned() } else { format!("{:.0} %", 100.0 * probability) }
 }
 
-/// Where the axis is, seen by the person: "upright, on the left".
+/// Where the axis is, seen by the person: "upright, left"; or where it leads: "straight out".
 #[must_use]
 pub fn axis(part: &Part, face: Option<&Face>) -> String {
     let phi = part.joint.articulation;
@@ -56,11 +62,15 @@ pub fn axis(part: &Part, face: Option<&Face>) -> String {
     let Some(face) = face else { return tilt.to_owned() };
     match phi.kind {
         JointKind::Prismatic => {
-            if phi.axis.dot(&face.normal) > 0.8 {
-                "straight out".to_owned()
-            } else {
-                format!("{tilt}, sideways")
+            let [right, up, out] = [&face.right, &face.up, &face.normal].map(|axis| phi.axis.dot(axis));
+            match (out > 0.8, right.abs() >= up.abs(), right > 0.0, up > 0.0) {
+                (true, ..) => "straight out",
+                (_, true, true, _) => "to the right",
+                (_, true, false, _) => "to the left",
+                (_, false, _, true) => "upwards",
+                (_, false, _, false) => "downwards",
             }
+            .to_owned()
         }
         JointKind::Revolute => {
             let [right, up, _] = face.coordinates(&phi.origin);

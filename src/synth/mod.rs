@@ -117,11 +117,13 @@ impl Changes {
             }
         }
         if self.few_hands == Some(0) || self.clips_per_part == Some(0) {
-            return wrong("0 hands or clips a part leave nothing to infer from; give 1 or more".to_owned());
+            return wrong("0 hands or clips per part leave nothing to infer from; give 1 or more".to_owned());
         }
         if self.clips_per_part.is_some() && tiers::sizes(tier, self).is_none() {
             let tier = tier.name();
-            return wrong(format!("clips a part can be chosen on the tiers t0 to nonm, not on {tier}"));
+            return wrong(format!(
+                "a number of clips per part can be asked for on the tiers t0 to nonm, not on {tier}"
+            ));
         }
         Ok(())
     }

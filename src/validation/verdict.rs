@@ -310,10 +310,12 @@ fn judge(
         };
         (Verdict::Undetermined, text)
     } else if let Some(rival) = best.filter(|r| r.margin_nats < config.margin_nats) {
-        let text = if rival.margin_nats > 0.0 {
+        let text = if clips.iter().map(way).fold(0.0, f64::max) < GLIMPSE_M {
+            "the hand was seen for a moment only: no motion to replay".to_owned()
+        } else if rival.margin_nats >= 0.0 {
             format!("over {} a {} would look about the same", amount(kind, range), rival.name)
         } else {
-            format!("over {} a {} looks even a little better", amount(kind, range), rival.name)
+            format!("over {} a {} looks better, but not by enough to decide", amount(kind, range), rival.name)
         };
         (Verdict::Undetermined, text)
     } else {
@@ -337,6 +339,15 @@ fn judge(
         rivals,
         clips,
     }
+}
+
+/// A hand that went less far was seen for a moment, not in motion, metres.
+const GLIMPSE_M: f64 = 0.02;
+
+/// How far the hand went from where it was first seen, metres.
+fn way(clip: &ClipCheck) -> f64 {
+    let hand = &clip.replay.hand;
+    hand.first().map_or(0.0, |start| hand.iter().map(|p| (p - start).norm()).fold(0.0, f64::max))
 }
 
 /// Root mean square of the clips' distances.
@@ -401,7 +412,15 @@ fn one_in(nats: f64) -> String {
     // Beyond this the hands' own model is in doubt, not the rival.
     const MOST: f64 = 1e6;
     let odds = nats.exp();
-    if odds > MOST { "less than a millionth".to_owned() } else { format!("1/{odds:.0}") }
+    match odds {
+        odds if odds > MOST => "less than a millionth".to_owned(),
+        odds if odds < 100.0 => format!("1/{odds:.0}"),
+        // More than two digits are the noise's.
+        odds => {
+            let unit = 10f64.powf(odds.log10().floor() - 1.0);
+            format!("1/{:.0}", (odds / unit).round() * unit)
+        }
+    }
 }
 
 fn amount(kind: JointKind, opening: f64) -> String {
