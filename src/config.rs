@@ -226,6 +226,8 @@ block! {
         use_face_normal: bool = true, "-", "ours";
         /// Hinge directions within this angle of an axis of the face are set to it.
         snap_deg: f64 = 12.0, "deg", "ours";
+        /// Log odds of reported probabilities are divided by this; chosen on the development seeds of all tiers.
+        temperature: f64 = 3.0, "-", "ours";
         /// Fit the hinge and the openings to the depth of the open state.
         refit: bool = true, "-", "ours";
         /// Merge clips of one joint into one scene-level joint.

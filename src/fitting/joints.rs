@@ -348,7 +348,7 @@ fn found(entry: &Entry, frame: &Frame, config: &config::Fitting) -> Result<Found
         grip,
         face: Some(face),
         part: Some(rect),
-        axis_probability: 1.0,
+        joint_probability: 1.0,
         hinge_std_m: None,
         moved: Vec::new(),
         observed_range: upper,
@@ -548,7 +548,8 @@ mod tests {
 
     #[test]
     fn errors_name_the_joint_and_the_field() {
-        let breaks: [(fn(&mut Entry), &str); 14] = [
+        type Break = (fn(&mut Entry), &'static str);
+        let breaks: [Break; 14] = [
             (|e| e.axis = Some(Vector::new(0.0, 0.0, 2.0)), "joint door: axis: has length 2"),
             (|e| e.axis = Some(Vector::repeat(f64::NAN)), "joint door: axis"),
             (|e| e.axis = None, "joint door: axis: is missing"),

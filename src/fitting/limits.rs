@@ -19,6 +19,7 @@
 //! read off.
 
 use crate::articulation::{Articulation, JointKind};
+use crate::config;
 use crate::geometry::Face;
 use crate::math::{Point, Pose, Vector};
 use crate::twin::{Furniture, OrientedBox, Part, Role, Solid};
@@ -38,8 +39,8 @@ const SLIDER_OVERLAP_M: f64 = 0.03;
 
 /// The ends of an observed motion are known to about this: radians for hinges, metres for slides.
 const OBSERVED_NOISE: [f64; 2] = [0.09, 0.03];
-/// Least limit, rad or m: a joint has a range.
-const LEAST: [f64; 2] = [0.02, 0.01];
+/// Least limit, rad or m: a joint has a range; a hinge of less looks like half a turn whose degrees were read as radians.
+const LEAST: [f64; 2] = [0.06, 0.01];
 /// Openings between two looks at what is in the way, rad or m.
 const STEP: [f64; 2] = [1.0 / 180.0 * std::f64::consts::PI, 0.005];
 
@@ -159,6 +160,37 @@ impl Bounds {
 /// Everything of a piece of furniture, closed.
 fn closed(piece: &Furniture) -> impl Iterator<Item = OrientedBox> {
     piece.carcass.iter().chain(&piece.part.solids).map(|s| s.shape)
+}
+
+/// A leaf that slides along its face and would run into its neighbours' fronts runs before them, as sliding doors do.
+pub(super) fn before_neighbours(furniture: &mut [Furniture], config: &config::Fitting) {
+    for i in 0..furniture.len() {
+        let part = furniture[i].part.clone();
+        let out: Vector = part.bounds.rotation.column(2).into_owned();
+        let phi = part.joint.articulation;
+        if phi.kind != JointKind::Prismatic || phi.axis.dot(&out).abs() > 0.3 {
+            continue;
+        }
+        let others: Vec<OrientedBox> =
+            furniture.iter().enumerate().filter(|(j, _)| *j != i).flat_map(|(_, f)| closed(f)).collect();
+        let free = |part: &Part| Way::of(part, 0.0, part.joint.observed).free(&others);
+        let moved = ahead(&part, &(out * (config.board_m + 2.0 * config.clearance_m)));
+        let clear = moved.solids.iter().all(|s| others.iter().all(|o| !overlap::boxes(&s.shape, o)));
+        if clear && free(&moved) > free(&part) {
+            furniture[i].part = moved;
+        }
+    }
+}
+
+/// A part elsewhere, with its joint.
+fn ahead(part: &Part, by: &Vector) -> Part {
+    let mut part = part.clone();
+    for shape in part.solids.iter_mut().map(|s| &mut s.shape).chain([&mut part.bounds]) {
+        shape.center += by;
+    }
+    part.handle += by;
+    part.joint.articulation.origin += by;
+    part
 }
 
 /// Sets each limit within what was observed: up to what stands in the way. `ranks[i]` is the place of piece `i` in the

@@ -76,6 +76,7 @@ pub fn fit(scene: &Scene, up: &Vector, config: &config::Fitting) -> Twin {
     let mut furniture: Vec<Furniture> = ranked.into_iter().map(|(.., f)| f).collect();
 
     // The room leaves free where parts were seen to go, and limits what nobody saw.
+    limits::before_neighbours(&mut furniture, config);
     limits::within_observed(&mut furniture, &ranks);
     let surroundings = scene.surroundings.as_ref().filter(|_| config.room);
     let room = surroundings.map_or_else(Vec::new, |cells| room::boxes(cells, &furniture, config));
@@ -446,7 +447,7 @@ mod tests {
             clips: vec![],
             furniture: None,
             type_probability: 1.0,
-            axis_probability: 1.0,
+            joint_probability: 1.0,
             hinge_std_m: None,
             grip: Point::new(0.2, -0.035, 0.8),
             face: Some(face),

@@ -229,7 +229,7 @@ fn flattened(occupied: &mut BTreeMap<Index, Extent>, edge: f64) -> Vec<Plane> {
                 .filter(|(index, extent)| {
                     (0.5 * (extent[axis][0] + extent[axis][1]) - offset).abs() <= edge
                         && !settled.contains(*index)
-                        && members.binary_search(&onto(*index)).is_ok()
+                        && members.binary_search(&onto(index)).is_ok()
                 })
                 .map(|(index, _)| *index)
                 .collect();

@@ -187,20 +187,13 @@ pub fn open_views<'a>(
 }
 
 /// How well a joint explains the open views: of the face's points that it moves clearly, the share that is seen where it
-/// puts them rather than seen through there, and no longer where they were; and the number of such sights. `rect` bounds the points where it is known.
+/// puts them rather than seen through there, and no longer where they were; and the number of such sights.
 ///
 /// Hands and depth disagree by a few centimetres that stay the same over a clip (a hand's distance is the least certain thing
 /// about it): the opening that the hand tells is taken with an offset of its own, the one that explains most, less what so
 /// large an offset is believed in. `grip_std_m` is the spread of the offsets, metres.
 #[must_use]
-pub fn agreement(
-    face: &Face,
-    rect: Option<&Rect>,
-    joint: &Articulation,
-    grip: &Point,
-    grip_std_m: f64,
-    views: &[View],
-) -> (f64, usize) {
+pub fn agreement(sights: &Sights, joint: &Articulation, grip: &Point, grip_std_m: f64) -> (f64, usize) {
     /// Between two offsets, metres: what the depth's tolerance bridges.
     const STEP_M: f64 = 0.02;
     /// Half a squared standard deviation against the log likelihood that the whole share is worth to the reasoner.
@@ -212,23 +205,31 @@ pub fn agreement(
     // Where a hand was lost before it let go, the views after that have an offset of their own.
     let of = |hold: Hold| -> (f64, usize) {
         let std_m = hold.std_m(grip_std_m);
-        // Two standard deviations to each side.
-        let reach = (2.0 * std_m / STEP_M).round() as i32;
-        (0..=2 * reach)
-            // From the middle outwards: of equal offsets the smallest is kept.
-            .map(|k| f64::from(if k % 2 == 0 { -k / 2 } else { k / 2 + 1 }) * STEP_M)
-            .map(|offset| {
-                let (share, count) = seen_share(face, rect, joint, grip, views, hold, offset / lever);
-                ((share - SHARE_PER_NAT * 0.5 * (offset / std_m).powi(2)).max(0.0), count)
-            })
-            // An offset under which nothing moves clearly explains nothing.
-            .fold((0.0, 0), |best: (f64, usize), a| {
-                let better = (a.1 >= MIN_POINTS, a.0).partial_cmp(&(best.1 >= MIN_POINTS, best.0));
-                if better == Some(Ordering::Greater) || best.1 == 0 { a } else { best }
-            })
+        let at = |offset: f64| -> (f64, usize) {
+            let (share, count) = seen_share(sights, joint, grip, hold, offset / lever);
+            ((share - SHARE_PER_NAT * 0.5 * (offset / std_m).powi(2)).max(0.0), count)
+        };
+        // An offset under which nothing moves clearly explains nothing; of equal offsets the first is kept.
+        let better = |best: (f64, (f64, usize)), offset: f64| -> (f64, (f64, usize)) {
+            let found = at(offset);
+            let order = (found.1 >= MIN_POINTS, found.0).partial_cmp(&(best.1.1 >= MIN_POINTS, best.1.0));
+            if order == Some(Ordering::Greater) { (offset, found) } else { best }
+        };
+        // Two standard deviations to each side, from the middle outwards: far reaches by double steps first.
+        let stride = if std_m > 2.0 * STEP_M { 2.0 * STEP_M } else { STEP_M };
+        let reach = (2.0 * std_m / stride).round() as i32;
+        let mut best = (0.0, at(0.0));
+        for k in 1..=reach {
+            best = better(better(best, -f64::from(k) * stride), f64::from(k) * stride);
+        }
+        if stride > STEP_M {
+            let middle = best.0;
+            best = better(better(best, middle - STEP_M), middle + STEP_M);
+        }
+        best.1
     };
     let (mut explained, mut count) = (0.0, 0);
-    for hold in Hold::ALL.into_iter().filter(|h| views.iter().any(|v| v.hold == *h)) {
+    for hold in Hold::ALL.into_iter().filter(|h| sights.views.iter().any(|v| v.hold == *h)) {
         let (share, points) = of(hold);
         explained += share * points as f64;
         count += points;
@@ -251,29 +252,47 @@ pub fn log_likelihood((share, count): (f64, usize)) -> f64 {
 /// A share of fewer points is noise.
 pub const MIN_POINTS: usize = 100;
 
+/// Points of a face's part, closed, and what the open views see there: the same for every joint that it could have.
+#[derive(Debug, Clone)]
+pub struct Sights<'a> {
+    face: &'a Face,
+    bounds: [[f64; 2]; 2],
+    views: &'a [View<'a>],
+    points: Vec<Point>,
+    /// For each view and point [`View::gap`].
+    closed: Vec<Vec<Option<(f64, f64)>>>,
+}
+
+impl<'a> Sights<'a> {
+    /// A grid over the part, or over a piece of its face around the grip where the part is not known.
+    #[must_use]
+    pub fn of(face: &'a Face, rect: Option<&Rect>, views: &'a [View<'a>]) -> Self {
+        // What the smallest front has.
+        const HALF_M: f64 = 0.12;
+        const STEPS: usize = 12;
+        let bounds = rect.map_or([[-HALF_M, HALF_M]; 2], |r| r.bounds);
+        let at = |k: usize, b: [f64; 2]| b[0] + (b[1] - b[0]) * (k as f64 + 0.5) / STEPS as f64;
+        let points: Vec<Point> =
+            (0..STEPS * STEPS).map(|i| face.point(at(i % STEPS, bounds[0]), at(i / STEPS, bounds[1]), 0.0)).collect();
+        let closed = views.iter().map(|view| points.iter().map(|p| view.gap(p)).collect()).collect();
+        Self { face, bounds, views, points, closed }
+    }
+}
+
 /// The share of [`agreement`] in the views of one sort, with `offset` (rad or m) added to the opening that the hand tells.
-pub(super) fn seen_share(
-    face: &Face,
-    rect: Option<&Rect>,
-    joint: &Articulation,
-    grip: &Point,
-    views: &[View],
-    hold: Hold,
-    offset: f64,
-) -> (f64, usize) {
-    // Without a known part, a piece of its face around the grip that the smallest front has.
-    const HALF_M: f64 = 0.12;
-    const STEPS: usize = 12;
-    let bounds = rect.map_or([[-HALF_M, HALF_M]; 2], |r| r.bounds);
+pub(super) fn seen_share(sights: &Sights, joint: &Articulation, grip: &Point, hold: Hold, offset: f64) -> (f64, usize) {
+    let Sights { face, bounds, .. } = sights;
     let (mut explained, mut count) = (0usize, 0usize);
-    for view in views.iter().filter(|v| v.hold == hold) {
+    for (view, closed) in sights.views.iter().zip(&sights.closed).filter(|(v, _)| v.hold == hold) {
         let motion = joint.motion(joint.opening_at(grip, &view.grip) + offset);
         let back = motion.inverse();
-        for i in 0..STEPS * STEPS {
-            let at = |k: usize, b: [f64; 2]| b[0] + (b[1] - b[0]) * (k as f64 + 0.5) / STEPS as f64;
-            let here = face.point(at(i % STEPS, bounds[0]), at(i / STEPS, bounds[1]), 0.0);
+        for (here, closed) in sights.points.iter().zip(closed) {
             let moved = motion * here;
             let travel = (moved - here).norm();
+            // Less than twice the least tolerance is no motion anywhere.
+            if travel < 2.0 * tolerance(0.0) {
+                continue;
+            }
             // Where it goes. Within the face there is a surface whether the part slid there or not.
             if let Some((gap, z)) = view.gap(&moved)
                 && travel >= 2.0 * tolerance(z)
@@ -284,7 +303,7 @@ pub(super) fn seen_share(
                 explained += usize::from(gap <= tolerance(z));
             }
             // Where it was, unless another piece of it is there now.
-            if let Some((gap, z)) = view.gap(&here)
+            if let Some((gap, z)) = *closed
                 && travel >= 2.0 * tolerance(z)
                 && gap >= -tolerance(z)
             {

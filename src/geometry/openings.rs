@@ -7,7 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::Face;
-use super::moved::{Hold, Rect, View};
+use super::moved::{Hold, Rect, Sights, View};
 use crate::articulation::{Articulation, JointKind};
 use crate::math::{Point, Vector, any_orthogonal, reject, unit};
 
@@ -104,7 +104,8 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
         .iter()
         .zip(clips)
         .map(|(views, clip)| {
-            let of = Hold::ALL.map(|hold| coarse(face, rect, joint, clip, views, hold, lever(clip)));
+            let sights = Sights::of(face, Some(rect), clip.views);
+            let of = Hold::ALL.map(|hold| coarse(&sights, joint, clip, views, hold, lever(clip)));
             views.iter().map(|s| of[s.view.hold as usize]).collect()
         })
         .collect();
@@ -232,15 +233,7 @@ fn weight(residual: f64, scale: f64) -> f64 {
 }
 
 /// The common offset of a clip's openings under which the views explain most, less what so large an offset is believed in.
-fn coarse(
-    face: &Face,
-    rect: &Rect,
-    joint: &Articulation,
-    clip: &OpenState,
-    views: &[Seen],
-    hold: Hold,
-    lever: f64,
-) -> f64 {
+fn coarse(sights: &Sights, joint: &Articulation, clip: &OpenState, views: &[Seen], hold: Hold, lever: f64) -> f64 {
     // Two centimetres at the grip, which the depth's tolerance bridges.
     const STEP_M: f64 = 0.02;
     const REACH: f64 = 3.0;
@@ -255,7 +248,7 @@ fn coarse(
         .filter(|offset| widest + offset > 0.0)
         .map(|offset| {
             let x = offset / std;
-            let seen = super::moved::seen_share(face, Some(rect), joint, &clip.grip, clip.views, hold, offset);
+            let seen = super::moved::seen_share(sights, joint, &clip.grip, hold, offset);
             (super::moved::log_likelihood(seen) - 0.5 * (TAIL + 1.0) * (x * x / TAIL).ln_1p(), offset)
         })
         .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.abs().total_cmp(&a.1.abs())))

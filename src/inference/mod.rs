@@ -25,8 +25,8 @@ pub struct ClipJoint {
     pub source: AxisSource,
     /// Probability of the type.
     pub type_probability: f64,
-    /// Share of the weight of all explanations of that type that agrees with this axis.
-    pub axis_probability: f64,
+    /// Probability of the type and the axis: of the weight of all explanations the share that agrees.
+    pub joint_probability: f64,
     /// Root mean square distance of the smoothed hand from the joint's path, metres.
     pub residual_m: f64,
     /// Share of hand samples within the torus (§B.1) or the slide's tolerance.
@@ -109,13 +109,14 @@ pub fn infer(
         JointKind::Prismatic => path[0],
     };
     let all: Vec<(Articulation, f64)> = ranked.iter().map(|(w, c)| (c.joint, (w - ranked[0].0).exp())).collect();
+    let type_probability = revolute_probability.max(1.0 - revolute_probability);
     let grip = trajectory.closed_grip();
     Outcome::Found(ClipJoint {
         joint,
         contact_pivot,
         source: best.source,
-        type_probability: revolute_probability.max(1.0 - revolute_probability),
-        axis_probability: agreeing_share(&best.joint, &all),
+        type_probability: tempered(type_probability, config.temperature),
+        joint_probability: tempered(type_probability * agreeing_share(&best.joint, &all), config.temperature),
         residual_m: residual,
         inliers,
         radius_m,
@@ -159,6 +160,14 @@ pub fn opening_sense<'a>(
     }
     let opened: f64 = trajectories.map(|t| joint.opening_at(&t.closed_grip(), &t.open_grip())).sum();
     if opened < 0.0 { joint.reversed() } else { joint }
+}
+
+/// A probability with its log odds divided by `temperature`: pieces of evidence that share a hand, a depth estimate or a
+/// view count as independent where weights are multiplied, and are not.
+#[must_use]
+pub fn tempered(probability: f64, temperature: f64) -> f64 {
+    let p = probability.clamp(1e-12, 1.0 - 1e-12);
+    1.0 / (1.0 + (-(p / (1.0 - p)).ln() / temperature).exp())
 }
 
 /// Of the weight of all joints of `best`'s type the share of those that are the same explanation.

@@ -47,7 +47,7 @@ pub fn infer(
         contact_pivot,
         source: candidate.source,
         type_probability: 1.0 / (1.0 + (-words_log_odds.abs()).exp()),
-        axis_probability: 1.0,
+        joint_probability: 1.0,
         residual_m,
         inliers,
         radius_m,

@@ -139,7 +139,8 @@ pub fn model(model: &Model, twin: Option<&Twin>) -> Vec<Point> {
 #[must_use]
 pub fn scene(scene: &Scene, twin: Option<&Twin>) -> Vec<Point> {
     let mut said = BTreeMap::from([(1, Said::about(true)), (7, animations(scene, twin))]);
-    if let Some(twin) = twin {
+    // A file for physics engines must not be animated; what moves in it is not told by where its nodes are.
+    if let Some(twin) = twin.filter(|_| !scene.is_physics) {
         said.insert(9, same_places(twin, &scene.places));
     }
     points(said)
@@ -283,6 +284,8 @@ fn falls_out(said: &mut Said, model: &Model, tree: &Tree, joint: usize, travel: 
 
 fn masses(model: &Model, tree: Option<&Tree>, twin: Option<&Twin>) -> Said {
     let moving: BTreeSet<&str> = model.moving().map(|(_, j)| j.child.as_str()).collect();
+    // A wall may weigh what it likes; what moves, and what carries it, is furniture.
+    let furniture: BTreeSet<&str> = model.moving().flat_map(|(_, j)| [j.child.as_str(), j.parent.as_str()]).collect();
     let mut said = Said::about(false);
     let root = tree.and_then(|t| t.order.first().copied());
     for (i, link) in model.links.iter().enumerate() {
@@ -303,7 +306,9 @@ fn masses(model: &Model, tree: Option<&Tree>, twin: Option<&Twin>) -> Said {
             (MassSource::Shapes, None) => {
                 said.tell(format!("{name}: its mass comes from a mesh and is not worked out here"));
             }
-            (MassSource::Stated | MassSource::Shapes, Some(mass)) => mass_of(&mut said, link, mass),
+            (MassSource::Stated | MassSource::Shapes, Some(mass)) => {
+                mass_of(&mut said, link, mass, furniture.contains(name.as_str()));
+            }
         }
     }
     if let Some(twin) = twin {
@@ -323,9 +328,9 @@ fn masses(model: &Model, tree: Option<&Tree>, twin: Option<&Twin>) -> Said {
     said
 }
 
-fn mass_of(said: &mut Said, link: &Link, mass: f64) {
+fn mass_of(said: &mut Said, link: &Link, mass: f64, is_furniture: bool) {
     let name = &link.name;
-    if !(MIN_MASS_KG..=MAX_MASS_KG).contains(&mass) {
+    if !(MIN_MASS_KG..=MAX_MASS_KG).contains(&mass) && (is_furniture || mass.is_nan() || mass <= 0.0) {
         said.fault(format!("{name}: {mass} kg; furniture's parts weigh {MIN_MASS_KG} to {MAX_MASS_KG} kg"));
     }
     // Above every body, and where eigenvalues are no numbers any more.
@@ -540,6 +545,15 @@ fn animations(scene: &Scene, twin: Option<&Twin>) -> Said {
         {
             said.fault(format!("{name}: its animation opens to {:.4}, its limit is {upper:.4}", moved.reaches));
         }
+    }
+    if scene.is_physics {
+        if let Some(moved) = scene.moved.first() {
+            said.fault(format!(
+                "{}: is animated, and animations override physics; keep them in another file",
+                moved.name
+            ));
+        }
+        return said;
     }
     for part in twin.iter().flat_map(|t| &t.furniture).map(|f| &f.part) {
         match scene.moved.iter().find(|m| m.name == part.id) {

@@ -43,6 +43,8 @@ pub struct Scene {
     pub moved: Vec<Moved>,
     /// Named nodes at and below moved ones.
     pub places: BTreeMap<String, Places>,
+    /// The file describes rigid bodies and joints for a physics engine (`KHR_physics_rigid_bodies`).
+    pub is_physics: bool,
     /// Extensions without which the file cannot be shown.
     pub required: Vec<String>,
     /// What was not read.
@@ -95,6 +97,7 @@ pub fn read(path: &Path) -> Result<Scene> {
         source: path.to_owned(),
         moved: Vec::new(),
         places: BTreeMap::new(),
+        is_physics: file.extensions_used().any(|e| e == "KHR_physics_rigid_bodies"),
         required: file.extensions_required().map(str::to_owned).collect(),
         notes: Vec::new(),
     };

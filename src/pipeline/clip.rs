@@ -158,21 +158,12 @@ pub(super) fn infer(
         result.candidates =
             result.candidates.iter().map(|c| candidates::settled(c, &paths, &config.reasoning)).collect();
     }
+    let sights = result.face.as_ref().map(|face| moved::Sights::of(face, result.part.as_ref(), &open));
+    let grip_std_m = hands::grip_std_m(trajectory.closed_end_seen());
     let agreement: Vec<(f64, usize)> = result
         .candidates
         .iter()
-        .map(|c| {
-            result.face.as_ref().map_or((0.0, 0), |f| {
-                moved::agreement(
-                    f,
-                    result.part.as_ref(),
-                    &c.joint,
-                    &region.grip,
-                    hands::grip_std_m(trajectory.closed_end_seen()),
-                    &open,
-                )
-            })
-        })
+        .map(|c| sights.as_ref().map_or((0.0, 0), |s| moved::agreement(s, &c.joint, &region.grip, grip_std_m)))
         .collect();
     let answer = reasoner.answer(&Question {
         reading: &located.reading,
@@ -216,7 +207,7 @@ pub(super) fn infer(
 }
 
 /// Up, as the room's own upright edges have it where they are near the world's (which may be off by a degree).
-fn upward(recording: &Recording, room: Option<&ManhattanFrame>) -> crate::math::Vector {
+pub(super) fn upward(recording: &Recording, room: Option<&ManhattanFrame>) -> crate::math::Vector {
     let up = recording.up();
     room.map(|r| r.axes[2]).filter(|axis| crate::math::signed_angle(axis, &up) < 5f64.to_radians()).unwrap_or(up)
 }

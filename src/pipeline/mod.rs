@@ -66,8 +66,8 @@ pub struct SceneJoint {
     pub furniture: Option<String>,
     /// Probability of the type.
     pub type_probability: f64,
-    /// Probability that the axis is right, given that the type is.
-    pub axis_probability: f64,
+    /// Probability of type and axis.
+    pub joint_probability: f64,
     /// Standard deviation of a hinge across its axis, metres; `None` for slides and where the open state was not seen.
     pub hinge_std_m: Option<f64>,
     /// The grip when closed, world.
@@ -209,7 +209,13 @@ pub fn infer(
         })
         .collect::<Result<_>>()?;
     let joints = scene::merge(&rectified, &looks.sketches, &clips, reasoner, config);
-    let surroundings = room::cells(&rectified, &looks.sketches, room.as_ref(), &config.fitting);
+    let surroundings = room::cells(
+        &rectified,
+        &looks.sketches,
+        room.as_ref(),
+        &clip::upward(&rectified, room.as_ref()),
+        &config.fitting,
+    );
     let Recording { name: recording, depth_factors, .. } = rectified;
     Ok(Scene { recording, manhattan: room, depth_factors, clips, joints, surroundings })
 }

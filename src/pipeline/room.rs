@@ -43,6 +43,7 @@ pub(super) fn cells(
     recording: &Recording,
     sketches: &BTreeMap<usize, Sketch>,
     manhattan: Option<&ManhattanFrame>,
+    up: &Vector,
     config: &config::Fitting,
 ) -> Option<RoomCells> {
     /// Beyond three metres a metre-scale depth estimate is worth less than a voxel.
@@ -52,7 +53,7 @@ pub(super) fn cells(
     if !config.room {
         return None;
     }
-    let axes = grid_axes(manhattan, &recording.up());
+    let axes = grid_axes(manhattan, up);
     let edge_m = config.room_voxel_m;
     let needed = config.room_min_views as u32;
     // A frame without depth of its own has the reconstruction's, which is taken whole below.

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::clip::{self, part_shape};
 use super::{ClipResult, SceneJoint};
 use crate::articulation::{Action, Articulation, JointKind};
-use crate::config::Config;
+use crate::config::{Config, InferenceMethod};
 use crate::geometry::moved::{Hold, Rect};
 use crate::geometry::openings::{self, OpenState, Opening};
 use crate::geometry::{AxisCandidate, Face, candidates, moved};
@@ -42,7 +42,7 @@ pub(super) fn merge(
             normal: clip.face.map(|f| f.normal),
             kind: narration::read(&clip.clip).kind.filter(|_| !narration::read(&clip.clip).generic),
             part: clip.face.zip(clip.part),
-            joint: clip.joint.found().filter(|j| j.type_probability > 0.9).map(|j| j.joint),
+            joint: clip.joint.found().filter(|j| j.type_probability > 0.7).map(|j| j.joint),
         })
         .collect();
     let groups: Vec<Vec<usize>> = aggregate::group(&held, &config.inference)
@@ -114,8 +114,13 @@ fn merge_group(
     let grip = best_joint.grip;
     let face = clips[best].face;
     let (mut joint, mut type_probability) = (best_joint.joint, best_joint.type_probability);
-    let mut axis_probability = best_joint.axis_probability;
-    if group.len() > 1 {
+    let mut joint_probability = best_joint.joint_probability;
+    if group.len() > 1 && config.inference.method == InferenceMethod::Paper {
+        // The clips' own joints, one voice each.
+        let all: Vec<(Articulation, f64)> =
+            group.iter().filter_map(|&c| clips[c].joint.found()).map(|j| (j.joint, 1.0)).collect();
+        joint = aggregate::consensus(&joint, &all);
+    } else if group.len() > 1 {
         let paths: Vec<Vec<Point>> =
             group.iter().filter_map(|&c| clips[c].trajectory.as_ref()).map(Trajectory::positions).collect();
         let pooled: Vec<AxisCandidate> = pooled(clips, group, best, &grip, &config.inference)
@@ -143,21 +148,15 @@ fn merge_group(
             .into_iter()
             .flatten()
             .collect();
+            let contexts: Vec<(moved::Sights, Point)> =
+                contexts.iter().map(|(f, rect, grip)| (moved::Sights::of(f, rect.as_ref(), &open), *grip)).collect();
+            let grip_std_m = hands::grip_std_m(trajectory.closed_end_seen());
             let agreement: Vec<(f64, usize)> = pooled
                 .iter()
                 .map(|k| {
                     contexts
                         .iter()
-                        .map(|(f, rect, grip)| {
-                            moved::agreement(
-                                f,
-                                rect.as_ref(),
-                                &k.joint,
-                                grip,
-                                hands::grip_std_m(trajectory.closed_end_seen()),
-                                &open,
-                            )
-                        })
+                        .map(|(sights, grip)| moved::agreement(sights, &k.joint, grip, grip_std_m))
                         // A share of few points is noise.
                         .max_by(|a, b| {
                             let rank = |x: &(f64, usize)| (x.1 >= moved::MIN_POINTS, x.0);
@@ -190,8 +189,11 @@ fn merge_group(
             let all: Vec<(Articulation, f64)> =
                 pooled.iter().zip(&weights).map(|(k, w)| (k.joint, (w - weights[top]).exp())).collect();
             joint = aggregate::consensus(&pooled[top].joint, &all);
-            type_probability = revolute_probability.max(1.0 - revolute_probability);
-            axis_probability = inference::agreeing_share(&pooled[top].joint, &all);
+            let raw = revolute_probability.max(1.0 - revolute_probability);
+            let temperature = config.inference.temperature;
+            type_probability = inference::tempered(raw, temperature);
+            joint_probability =
+                inference::tempered(raw * inference::agreeing_share(&pooled[top].joint, &all), temperature);
         }
     }
     let trajectories = || group.iter().filter_map(|&c| clips[c].trajectory.as_ref());
@@ -229,7 +231,7 @@ fn merge_group(
             .find_map(|&c| narration::read(&clips[c].clip).furniture)
             .or_else(|| group.iter().find_map(|&c| clips[c].words.as_ref()?.furniture.clone())),
         type_probability,
-        axis_probability,
+        joint_probability,
         hinge_std_m,
         grip,
         face,

@@ -57,10 +57,12 @@ impl Sketch {
     /// Sample nearest to a pixel of the full image; `None` outside.
     #[must_use]
     pub fn sample(&self, u: f64, v: f64) -> Option<(usize, usize)> {
-        let at = |c: f64| ((c - (self.step / 2) as f64) / self.step as f64).round();
+        // Rounded by hand: half a sample outside is outside, and what is left is positive.
+        let at = |c: f64| (c - (self.step / 2) as f64) / self.step as f64 + 0.5;
         let (x, y) = (at(u), at(v));
-        (x >= 0.0 && y >= 0.0 && x < self.depth.width as f64 && y < self.depth.height as f64)
+        (x >= 0.0 && y >= 0.0)
             .then_some((x as usize, y as usize))
+            .filter(|(x, y)| *x < self.depth.width && *y < self.depth.height)
     }
 
     /// Point of a sample in the camera frame, with depth as read; `None` where there is none.

@@ -3,10 +3,11 @@
 use serde::Serialize;
 
 use crate::articulation::{Articulation, Outcome};
+use crate::evaluation::truth::Stage;
 use crate::evaluation::{Prediction, Predictions};
 use crate::inference::ClipJoint;
 use crate::math::Point;
-use crate::pipeline::Scene;
+use crate::pipeline::{ClipResult, Scene};
 use crate::reasoning::words::Words;
 use crate::twin::Twin;
 
@@ -111,6 +112,15 @@ pub fn articulations(scene: &Scene, reasoner: &str) -> crate::error::Result<Stri
     crate::json::text(&file)
 }
 
+/// The step that gave a clip up.
+fn stage(clip: &ClipResult) -> Stage {
+    match (&clip.trajectory, &clip.region) {
+        (None, _) => Stage::Hands,
+        (_, None) => Stage::Localization,
+        _ => Stage::Inference,
+    }
+}
+
 /// One row a clip: the scene's joint where the clip shows one, its own range, the twin's box.
 #[must_use]
 pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
@@ -131,7 +141,7 @@ pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
                 joint_confidence: None,
                 joint: None,
                 reason: c.joint.reason().map(str::to_owned),
-                stage: None,
+                stage: c.joint.reason().map(|_| stage(c)),
             };
             let joint = scene.joints.iter().find(|j| j.clips.contains(&c.clip.clip));
             let part = joint.and_then(|j| twin.furniture.iter().map(|f| &f.part).find(|p| p.id == j.id));
@@ -139,7 +149,7 @@ pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
             // A joint that could not be built is still an answer.
             let phi = part.map_or(joint.joint, |p| p.joint.articulation);
             let path = trajectory.positions();
-            row.reason = None;
+            (row.reason, row.stage) = (None, None);
             row.kind = Some(phi.kind);
             row.axis = Some(phi.axis);
             row.origin = Some(phi.origin);
@@ -150,7 +160,7 @@ pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
             row.range = joint.clips.iter().zip(&joint.moved).find(|(name, _)| **name == c.clip.clip).map(|(_, r)| *r);
             row.part_box = part.map(|p| p.bounds);
             row.confidence = Some(joint.type_probability);
-            row.joint_confidence = Some(joint.type_probability * joint.axis_probability);
+            row.joint_confidence = Some(joint.joint_probability);
             row.joint = Some(joint.id.clone());
             row
         })
