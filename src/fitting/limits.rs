@@ -194,8 +194,9 @@ fn ahead(part: &Part, by: &Vector) -> Part {
 }
 
 /// Sets each limit within what was observed: up to what stands in the way. `ranks[i]` is the place of piece `i` in the
-/// order of sureness, 0 first; assumed boards of less sure pieces give way.
-pub(super) fn within_observed(furniture: &mut [Furniture], ranks: &[usize]) {
+/// order of sureness, 0 first; assumed boards of less sure pieces give way. Returns the pieces whose part cannot move at all.
+pub(super) fn within_observed(furniture: &mut [Furniture], ranks: &[usize]) -> Vec<usize> {
+    let mut stuck = Vec::new();
     let mut order: Vec<usize> = (0..furniture.len().min(ranks.len())).collect();
     order.sort_by_key(|&i| ranks[i]);
     for &i in &order {
@@ -216,9 +217,20 @@ pub(super) fn within_observed(furniture: &mut [Furniture], ranks: &[usize]) {
             *carcass = left;
         }
         let others: Vec<OrientedBox> = order.iter().filter(|&&j| j != i).flat_map(|&j| closed(&furniture[j])).collect();
-        let upper = Way::of(&part, 0.0, seen).free(&others).max(least(kind));
-        furniture[i].part.joint.upper = upper;
+        // Its own boards are assumed, too; where none would be left they limit it.
+        let whole = Way::of(&part, 0.0, seen);
+        let own = &mut furniture[i].carcass;
+        if own.iter().any(|s| whole.free(&[s.shape]) >= seen) {
+            own.retain(|s| whole.free(&[s.shape]) >= seen);
+        }
+        let others: Vec<OrientedBox> = others.into_iter().chain(own.iter().map(|s| s.shape)).collect();
+        let upper = whole.free(&others);
+        if upper < least(kind) && seen >= least(kind) {
+            stuck.push(i);
+        }
+        furniture[i].part.joint.upper = upper.max(least(kind));
     }
+    stuck
 }
 
 /// Lets each limit grow up to what is expected, as far as neighbours, the own carcass and the room leave it free.

@@ -77,7 +77,18 @@ pub fn fit(scene: &Scene, up: &Vector, config: &config::Fitting) -> Twin {
 
     // The room leaves free where parts were seen to go, and limits what nobody saw.
     limits::before_neighbours(&mut furniture, config);
-    limits::within_observed(&mut furniture, &ranks);
+    let mut joints = joints;
+    let mut ranks = ranks;
+    // A part that its neighbours hold shut is wrong about where it is: it goes, and what it held is free.
+    while let Some(&worst) = limits::within_observed(&mut furniture, &ranks).iter().max_by_key(|&&i| ranks[i]) {
+        left_out.push(LeftOut {
+            id: furniture[worst].part.id.clone(),
+            reason: "surer furniture beside it would hold it shut".to_owned(),
+        });
+        furniture.remove(worst);
+        joints.remove(worst);
+        ranks.remove(worst);
+    }
     let surroundings = scene.surroundings.as_ref().filter(|_| config.room);
     let room = surroundings.map_or_else(Vec::new, |cells| room::boxes(cells, &furniture, config));
     limits::beyond_observed(&mut furniture, &room);
