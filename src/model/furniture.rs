@@ -270,7 +270,7 @@ fn bounds(solids: &[Solid], corners: &[Point], joint: &Articulation, handle: &Po
     OrientedBox { center: Point::from(rotation * ((low + high) * 0.5)), half: (high - low) * 0.5, rotation }
 }
 
-/// Gives the boards that parts hang on to the nearest of those parts. A board that stands inside another part would hold
+/// Gives the boards that parts hang on to the nearest of those parts, and the rest to the room. A board that stands inside another part would hold
 /// that part fast in a simulation: it is left out.
 fn boards(
     model: &Model,
@@ -294,6 +294,8 @@ fn boards(
             built.iter().enumerate().filter(|(_, (_, base))| is(*base)).map(|(k, _)| k).collect()
         };
         let mut owners = on(&|base| base == i);
+        // What no joint hangs on belongs to what is fixed to it, if that has no boxes of its own; else it is the room.
+        let is_room = owners.is_empty() && built.iter().all(|(_, base)| !solid_shapes(&model.links[*base]).is_empty());
         if owners.is_empty() {
             owners = on(&|base| tree.body[base] == tree.body[i]);
         }
@@ -312,7 +314,11 @@ fn boards(
             }
             let wanted = shape.name.clone().unwrap_or_else(|| format!("{}_{k}", link.name));
             let name = names.safe(&wanted);
-            twin.furniture[owner].carcass.push(Solid { name, role: Role::Carcass, shape: board, seen: true });
+            if is_room {
+                twin.room.push(Solid { name, role: Role::Room, shape: board, seen: true });
+            } else {
+                twin.furniture[owner].carcass.push(Solid { name, role: Role::Carcass, shape: board, seen: true });
+            }
         }
     }
     if left > 0 {

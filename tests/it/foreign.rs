@@ -198,7 +198,7 @@ fn each_broken_urdf_fails_the_point_that_is_broken() {
             &[3],
             "furniture's parts weigh",
         ),
-        ("no world", good.replace("\"world\"", "\"room\""), &[4], "nothing holds room"),
+        ("no world", good.replace("\"world\"", "\"site\""), &[4], "nothing holds site"),
         ("fused", between(&good, "<mujoco>", "</mujoco>", |_| String::new()), &[4], "melts"),
         (
             "no such link",
