@@ -16,6 +16,7 @@ import re
 from dataclasses import dataclass
 
 import numpy as np
+import replay
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 
@@ -310,6 +311,10 @@ class Engine(Reader):
 
     def again(self, step_secs):
         """A fresh engine with the same file and another time step."""
+        raise NotImplementedError
+
+    def alone(self, clip, step_secs):
+        """A fresh engine where the part of a `replay.Clip` meets what it meets in rapier, and nothing else meets anything."""
         raise NotImplementedError
 
     def repeated(self, twin):
@@ -691,6 +696,23 @@ def read_back(twin, reader):
             have, wanted = getattr(read[p.name], what), getattr(p, what)
             if have is not None and off(have, wanted) > reader.exact * max(1, off(wanted, 0)):
                 yield f"{p.name}: {what} {have}, the model has {wanted}"
+
+
+@point(16, "MJCF: a recorded hand moves its part as it did in rapier", "MJCF")
+def replayed(twin, engine):
+    clips = replay.clips(twin)
+    if not clips:
+        raise Unanswered("no recorded hand: a twin of joints alone")
+    law, share, length = replay.law(twin), 0.0, 0.0
+    for clip in clips:
+        error, rapier = replay.track(engine.alone(clip, law.step_secs), clip, law), clip.rapier_rms_m
+        off_by = abs(error - rapier)
+        # What is not a number does not agree.
+        if not off_by <= max(replay.AGREE_SHARE * rapier, replay.AGREE_M):
+            yield f"{clip.part.name}, {clip.name}: follows the hand to {1000 * error:.2f} mm, in rapier to {1000 * rapier:.2f} mm"
+        share, length = max(share, off_by / max(rapier, 1e-9)), max(length, off_by)
+    yield Measured("tracking error beside rapier's", 100 * share, "%")
+    yield Measured("tracking error beside rapier's", 1000 * length, "mm")
 
 
 @point(17, "the same run twice, the same file twice")

@@ -149,7 +149,14 @@ DRIVEN = "the same plant as from the URDF, which is driven"
 
 class Mjcf(Drake):
     format = "MJCF"
-    cannot = {**Urdf.cannot, 6: "the text and MuJoCo answer it", 12: DRIVEN, 13: DRIVEN, 17: DRIVEN}
+    cannot = {
+        **Urdf.cannot,
+        6: "the text and MuJoCo answer it",
+        12: DRIVEN,
+        13: DRIVEN,
+        16: "does not simulate joint friction",
+        17: DRIVEN,
+    }
 
 
 READERS = [Urdf, Mjcf]
