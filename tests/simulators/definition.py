@@ -34,6 +34,9 @@ TIME_SHARE = 0.03
 STEP_SHARE = 0.02
 CREEP_SHARE = 0.02
 
+# A slow simulator opens every part of a twin of up to so many.
+FEW_PARTS = 6
+
 # The hand: it pulls square to the lever at a hinge's handle, along the axis at a slide's.
 PULL_N = {"revolute": 5.0, "prismatic": 15.0}
 REST_SECS = 2.0
@@ -213,7 +216,7 @@ class Twin:
 
     def moved_by(self, reader):
         """The parts that are opened one by one in a simulator: all, or in a slow one a few, drawn by the twin's name."""
-        if len(self.parts) <= reader.most:
+        if len(self.parts) <= max(reader.most, FEW_PARTS):
             return self.parts
         return random.Random(self.name).sample(self.parts, reader.most)
 
@@ -274,7 +277,7 @@ class Reader:
     exact = 1e-6
     # Whether it knows that a spring carries a part.
     springs = False
-    # How many parts of a twin it opens one by one: fewer than there may be where a step of a whole kitchen takes long.
+    # How many parts of a large twin it opens one by one: not all where a step of a whole kitchen takes long.
     most = math.inf
 
     def limits(self):
