@@ -215,7 +215,7 @@ class Twin:
         return twin
 
     def moved_by(self, reader):
-        """The parts that are opened one by one in a simulator: all, or in a slow one a few, drawn by the twin's name."""
+        """The parts that a simulator opens one by one: all, or in a slow one a few, drawn by the twin's name."""
         if len(self.parts) <= max(reader.most, FEW_PARTS):
             return self.parts
         return random.Random(self.name).sample(self.parts, reader.most)
@@ -317,7 +317,7 @@ class Engine(Reader):
         raise NotImplementedError
 
     def alone(self, clip, step_secs):
-        """A fresh engine where the part of a `replay.Clip` meets what it meets in rapier, and nothing else meets anything."""
+        """A fresh engine where the part of a `replay.Clip` meets what it meets in rapier, and nothing else does."""
         raise NotImplementedError
 
     def repeated(self, twin):
@@ -712,7 +712,8 @@ def replayed(twin, engine):
         off_by = abs(error - rapier)
         # What is not a number does not agree.
         if not off_by <= max(replay.AGREE_SHARE * rapier, replay.AGREE_M):
-            yield f"{clip.part.name}, {clip.name}: follows the hand to {1000 * error:.2f} mm, in rapier to {1000 * rapier:.2f} mm"
+            found = f"follows the hand to {1000 * error:.2f} mm, in rapier to {1000 * rapier:.2f} mm"
+            yield f"{clip.part.name}, {clip.name}: {found}"
         share, length = max(share, off_by / max(rapier, 1e-9)), max(length, off_by)
     yield Measured("tracking error beside rapier's", 100 * share, "%")
     yield Measured("tracking error beside rapier's", 1000 * length, "mm")

@@ -1,13 +1,14 @@
-"""Kitchens without a recording: fitted rows of drawers, doors, flaps, lids and sliders, 1 to 40 joints each, from a seed.
+"""Kitchens without a recording: rows of drawers, doors, flaps, lids and sliders, 1 to 40 joints each, from a seed.
 
     python3 tests/simulators/kitchens.py DIR [--paws FILE] [--joints N...]
 
-Writes DIR/kitchen_NN/joints.json (docs/joints-format.md) for each number of joints; with --paws, the twin of it in
-every format beside it, so that DIR/kitchen_NN is a TWIN of matrix.py. Exit code 1 where `paws` did not build every joint.
-The frame, its up and its unit differ from kitchen to kitchen, as those of other people's files do.
+Writes DIR/kitchen_NN/joints.json (docs/joints-format.md) for each number of joints; with --paws also the twin of it in
+every format, which makes DIR/kitchen_NN a TWIN of matrix.py. Exit code 1 where `paws` did not build every joint. The
+frame, its up and its unit differ from kitchen to kitchen, as those of other people's files do.
 """
 
 import argparse
+import itertools
 import json
 import math
 import pathlib
@@ -23,6 +24,7 @@ ROOM, ROW, ROOMS_ACROSS = 7.0, 4.2, 4
 LEAF, DEPTH = 0.018, 0.56
 # From the edge of a front to its handle's middle; the handle stands in front of it.
 RIM, GRIP = 0.06, 0.035
+KINDS = ("drawers", "drawers", "door", "pair", "oven", "dishwasher", "fridge", "larder", "bench", "slider")
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
@@ -52,7 +54,7 @@ class Row:
         """A part between two corners that moves about or along `axis` at `at`, all (u, d, z)."""
         # Furniture lies behind the front, that of a lid below it.
         lid = high[1] - low[1] > 2 * LEAF and high[2] - low[2] <= 2 * LEAF
-        base = self.box((low[0], low[1], high[2] - deep), high) if lid else self.box(low, (high[0], low[1] + deep, high[2]))
+        behind = ((low[0], low[1], high[2] - deep), high) if lid else (low, (high[0], low[1] + deep, high[2]))
         found = {
             "label": label,
             "type": kind,
@@ -60,7 +62,7 @@ class Row:
             "origin": self.point(*at),
             "range": [0.0, upper],
             "part_box": self.box(low, high),
-            "base_box": base,
+            "base_box": self.box(*behind),
         }
         return found | ({"handle": self.point(*handle)} if handle else {})
 
@@ -100,7 +102,7 @@ class Row:
 
 def column(row, rng, u):
     """(width, joints) of what stands next in a row."""
-    kind = rng.choice(("drawers", "drawers", "door", "pair", "oven", "dishwasher", "fridge", "larder", "bench", "slider"))
+    kind = rng.choice(KINDS)
     w = round(rng.uniform(0.40, 0.60), 3)
     foot, top = 0.10, 0.86
     joints = []
@@ -110,7 +112,7 @@ def column(row, rng, u):
             edges.append(min(top, edges[-1] + rng.uniform(0.14, 0.38)))
         # A last one that would be too low becomes part of the one below.
         edges[-1] = top if top - edges[-1] < 0.12 else edges[-1]
-        joints = [row.drawer(rng, u, w, a, b - a) for a, b in zip(edges, edges[1:])]
+        joints = [row.drawer(rng, u, w, a, b - a) for a, b in itertools.pairwise(edges)]
     elif kind == "door":
         joints = [row.door(rng, u, w, foot, 0.58, rng.random() < 0.5), row.drawer(rng, u, w, 0.70, 0.16)]
     elif kind == "pair":

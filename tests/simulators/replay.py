@@ -1,8 +1,8 @@
 """What a recorded hand does with a part: the law of `paws validate`, once more, for any simulator.
 
-The hand is a spring and a damper between where it was recorded and the grip on the part, critical on the part's mass, slack
-for the first centimetre and no stronger than a person. It is read from the twin's own files: `trajectories.json` (the
-hands), `config.toml` (stiffness, slack, force, time step) and `validation.json` (the grip, and what rapier made of it).
+The hand is a spring and a damper between where it was recorded and the grip on the part: critical on the part's mass,
+slack for the first centimetre and no stronger than a person. All of it is in the twin's own files: `trajectories.json`
+(the hands), `config.toml` (stiffness, slack, force, time step) and `validation.json` (the grip, and rapier's answer).
 """
 
 import json
