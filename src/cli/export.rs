@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
+use rayon::prelude::*;
 
 use super::output::write_file;
 use super::{Answer, print, shown};
@@ -73,9 +74,26 @@ fn kind_of(path: &Path) -> anyhow::Result<Given> {
     }
 }
 
+/// A file's name and contents.
+type File = (&'static str, Vec<u8>);
+
+/// The files of one format.
+fn written(format: Format, twin: &Twin, verdicts: &[(String, String)]) -> crate::error::Result<Vec<File>> {
+    Ok(match format {
+        Format::Urdf => vec![("scene.urdf", export::urdf::write(twin)?.into_bytes())],
+        Format::Mjcf => vec![
+            ("scene.xml", export::mjcf::write(twin)?.into_bytes()),
+            ("kitchen.xml", export::mjcf::write_model(twin)?.into_bytes()),
+        ],
+        Format::Gltf => vec![("scene.glb", export::gltf::write(twin, verdicts)?)],
+        Format::GltfPhysics => vec![("physics.glb", export::gltf::write_physics(twin)?)],
+        Format::Usd => vec![("scene.usda", export::usd::write(twin)?.into_bytes())],
+    })
+}
+
 pub fn run(args: &ExportArgs) -> anyhow::Result<Answer> {
     // Every format is made before the first is written: nothing half-done is left behind.
-    let mut files: Vec<(&str, Vec<u8>)> = Vec::new();
+    let mut files: Vec<File> = Vec::new();
     let given = kind_of(&args.twin)?;
     // What could not be built of a twin was said when it was made.
     let made_here = matches!(given, Given::Joints);
@@ -101,17 +119,10 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<Answer> {
             (twin, Vec::new())
         }
     };
-    for format in &args.format {
-        match format {
-            Format::Urdf => files.push(("scene.urdf", export::urdf::write(&twin)?.into_bytes())),
-            Format::Mjcf => {
-                files.push(("scene.xml", export::mjcf::write(&twin)?.into_bytes()));
-                files.push(("kitchen.xml", export::mjcf::write_model(&twin)?.into_bytes()));
-            }
-            Format::Gltf => files.push(("scene.glb", export::gltf::write(&twin, &verdicts)?)),
-            Format::GltfPhysics => files.push(("physics.glb", export::gltf::write_physics(&twin)?)),
-            Format::Usd => files.push(("scene.usda", export::usd::write(&twin)?.into_bytes())),
-        }
+    let made: Vec<crate::error::Result<Vec<File>>> =
+        args.format.par_iter().map(|format| written(*format, &twin, &verdicts)).collect();
+    for format in made {
+        files.extend(format?);
     }
     std::fs::create_dir_all(&args.out).with_context(|| shown(&args.out))?;
     for (name, bytes) in files {

@@ -113,10 +113,18 @@ impl Scene {
             "asset": {"version": "2.0", "generator": concat!("paws ", env!("CARGO_PKG_VERSION"))},
             "scene": 0,
             "scenes": [{"name": name, "nodes": [0]}],
-            "nodes": self.nodes, "meshes": self.meshes, "materials": self.materials,
-            "accessors": self.buffer.accessors, "bufferViews": self.buffer.views,
             "buffers": [{"byteLength": self.buffer.bytes.len()}],
         });
+        // Moved: within `json!` each would be copied, node by node.
+        for (key, list) in [
+            ("nodes", self.nodes),
+            ("meshes", self.meshes),
+            ("materials", self.materials),
+            ("accessors", self.buffer.accessors),
+            ("bufferViews", self.buffer.views),
+        ] {
+            root[key] = Value::Array(list);
+        }
         for (key, value) in more {
             root[key] = value;
         }
@@ -166,7 +174,7 @@ pub fn write(twin: &Twin, verdicts: Verdicts) -> Result<Vec<u8>> {
         scene.nodes[room]["children"] = json!(children);
         roots.push(room);
     }
-    let more = if animations.is_empty() { Vec::new() } else { vec![("animations", json!(animations))] };
+    let more = if animations.is_empty() { Vec::new() } else { vec![("animations", Value::Array(animations))] };
     scene.finish(&twin.name, &roots, more)
 }
 
@@ -218,11 +226,11 @@ pub fn write_physics(twin: &Twin) -> Result<Vec<u8>> {
     let mut extensions = json!({});
     let mut used = Vec::new();
     if !shapes.is_empty() {
-        extensions[SHAPES] = json!({"shapes": shapes});
+        extensions[SHAPES]["shapes"] = Value::Array(shapes);
         used.extend([SHAPES, RIGID_BODIES]);
     }
     if !joints.is_empty() {
-        extensions[RIGID_BODIES] = json!({"physicsJoints": joints});
+        extensions[RIGID_BODIES]["physicsJoints"] = Value::Array(joints);
     }
     let more =
         if used.is_empty() { Vec::new() } else { vec![("extensionsUsed", json!(used)), ("extensions", extensions)] };

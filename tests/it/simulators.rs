@@ -40,6 +40,21 @@ fn python() -> Option<PathBuf> {
     home.join("python.installed").exists().then_some(python)
 }
 
+/// Twins that no recording was needed for: the folders of twenty kitchens of 1 to 40 joints.
+fn kitchens(python: &Path, dir: &Path) -> Vec<String> {
+    let mut make = Command::new(python);
+    make.arg(script("kitchens.py")).arg("kitchens").args(["--paws", env!("CARGO_BIN_EXE_paws")]).current_dir(dir);
+    let made = make.output().unwrap();
+    assert!(made.status.success(), "{}", text(&made));
+    let mut folders: Vec<String> = std::fs::read_dir(dir.join("kitchens"))
+        .unwrap()
+        .map(|entry| format!("kitchens/{}", entry.unwrap().file_name().to_string_lossy()))
+        .collect();
+    folders.sort();
+    assert_eq!(folders.len(), 20);
+    folders
+}
+
 #[test]
 fn twins_are_ready_for_every_simulator() {
     let Some(python) = python() else { return };
@@ -64,6 +79,7 @@ fn twins_are_ready_for_every_simulator() {
         assert_ne!(result.status.code(), Some(2), "{name}: {}", stderr(&result));
         twins.push(out);
     }
+    twins.extend(kitchens(&python, dir.path()));
     let mut matrix = Command::new(&python);
     matrix.arg(script("matrix.py")).args(&twins).args(["--paws", env!("CARGO_BIN_EXE_paws")]).current_dir(dir.path());
     if required() {

@@ -187,13 +187,12 @@ def main():
 
     absent = readers(tools, args.paws)[1]
     jobs = max(1, min(args.jobs or 1, len(args.twins)))
+    # The largest first, so that no process is left with one at the end.
+    order = sorted(args.twins, key=lambda twin: -(twin / "twin.json").stat().st_size)
     # Not forked: native libraries do not survive it.
     with concurrent.futures.ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
-        rows = [
-            row
-            for rows in pool.map(examine, args.twins, *([x] * len(args.twins) for x in (tools, args.paws)))
-            for row in rows
-        ]
+        found = dict(zip(order, pool.map(examine, order, *([x] * len(order) for x in (tools, args.paws)))))
+    rows = [row for twin in args.twins for row in found[twin]]
     print(as_text(rows, absent))
     if args.markdown:
         args.markdown.write_text(as_markdown(rows, absent), encoding="utf-8")

@@ -39,6 +39,8 @@ MUTATIONS = (
     ("no excludes", "MJCF", r"<exclude [^>]*/>", "", 6, "the text"),
     ("no mass", "MJCF", r"<inertial [^>]*/>", "", 3, "MuJoCo"),
     ("no friction", "MJCF", r'frictionloss="[^"]*"', "", 14, "MuJoCo"),
+    ("no friction", "MJCF", r'frictionloss="[^"]*"', "", 16, "MuJoCo"),
+    ("much more damping", "MJCF", r'damping="([^"]*)"', r'damping="1\1"', 16, "MuJoCo"),
     ("fronts 5 mm too deep", "MJCF", "fronts", "deep", 11, "MuJoCo"),
     ("handle elsewhere", "MJCF", r'(_handle" pos=")[^ ]*', r"\g<1>9", 9, "Drake"),
     ("no handle", "MJCF", r'<site name="([^"]*)_handle"', r'<site name="\1_grip"', 5, "the text"),
@@ -47,6 +49,8 @@ MUTATIONS = (
     ("axis token elsewhere", "USD", r'physics:axis = "X"', 'physics:axis = "Z"', 9, "usd-core"),
     ("no articulation", "USD", r"PhysicsArticulationRootAPI", "PhysicsFilteredPairsAPI", 8, "usd-core"),
     ("mass in grams", "USD", r"(physics:mass = [\d.]+)", r"\g<1>e3", 3, "usd-core"),
+    ("a slide off its line", "glTF", rb'"linearAxes":\[1,2\]', b'"linearAxes":[2]', 7, "validator, physics.glb"),
+    ("mass of another part", "glTF", rb'"mass":\d', b'"mass":9', 3, "validator, physics.glb"),
     ("not +Y up", "glTF", rb'"rotation":\[-0.70710\d*,0.0,0.0,', b'"rotation":[0.0,0.0,0.0,', 7, "three.js"),
 )
 
@@ -88,11 +92,12 @@ def main():
             copy = pathlib.Path(folder) / "twin"
             shutil.copytree(source, copy)
             twin = definition.Twin(copy)
-            file = model(twin, format)
+            reader = next(r for r in readers if (r.simulator, r.format) == (simulator, format))
+            # A format may have a file for viewers and one for engines.
+            file = copy / reader.file if hasattr(reader, "file") else model(twin, format)
             before = file.read_bytes()
             file.write_bytes(broken(file, pattern, replacement, twin))
             assert file.read_bytes() != before, f"{what}: nothing to break in {file.name}"
-            reader = next(r for r in readers if (r.simulator, r.format) == (simulator, format))
             rows = matrix.answers(reader, twin, {1, point})[0]
             reasons = [r for _, status, found, _ in rows if status == "FAIL" for r in found]
             missed += not reasons

@@ -29,6 +29,7 @@ def matrix(quaternion):
 class Urdf(Posed, Engine):
     format, simulator, version = "URDF", "PyBullet", importlib.metadata.version("pybullet")
     has_friction = False
+    most = 4
     cannot = {5: "the text answers it", 14: "does not simulate joint friction"}
 
     def __init__(self, twin, step_secs=1 / 240):

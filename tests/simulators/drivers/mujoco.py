@@ -2,6 +2,7 @@
 
 import mujoco
 import numpy as np
+import replay
 from definition import Body, Engine, Limits
 
 from . import captured
@@ -116,6 +117,22 @@ class Urdf(MuJoCo):
 class Mjcf(MuJoCo):
     format, springs = "MJCF", True
     cannot = Urdf.cannot
+
+    def alone(self, clip, step_secs):
+        engine = self.again(step_secs)
+        model = engine.model
+        boxes = (model.geom_type == mujoco.mjtGeom.mjGEOM_BOX) & (model.geom_contype != 0)
+        # Its own furniture, too, is in a part's way; the floor below everything is none of rapier's.
+        model.exclude_signature[:] = 0
+        model.geom_contype[:] = 0
+        model.geom_conaffinity[:] = np.where(boxes, 2**31 - 1, 0)
+        model.geom_friction[:, 0] = replay.RUBBING
+        own = np.flatnonzero(boxes & (model.geom_bodyid == engine.link[clip.part.link]))
+        for bit, geom in enumerate(own):
+            model.geom_contype[geom], model.geom_conaffinity[geom] = 1 << bit, 0
+        for mine, other in clip.apart:
+            model.geom_conaffinity[model.geom(other).id] &= ~model.geom_contype[model.geom(mine).id]
+        return engine
 
 
 READERS = [Urdf, Mjcf]
