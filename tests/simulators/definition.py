@@ -104,6 +104,8 @@ class Part:
         self.name, self.link, self.base = part["id"], f"{part['id']}_link", furniture["name"]
         self.kind, self.turns = phi["kind"], phi["kind"] == "revolute"
         self.axis, self.origin = np.array(phi["axis"]), np.array(phi["origin"])
+        # v -> axis x v: what a step of a simulation asks several times.
+        self.cross = np.cross(np.eye(3), self.axis)
         self.upper, self.damping, self.friction = joint["upper"], joint["damping"], joint["friction"]
         # A spring carries its weight.
         self.balanced = joint.get("balanced", False)
@@ -117,14 +119,12 @@ class Part:
         if not self.turns:
             return point + self.axis * q
         r = point - self.origin
-        turned = (
-            r * math.cos(q) + np.cross(self.axis, r) * math.sin(q) + self.axis * (self.axis @ r) * (1 - math.cos(q))
-        )
+        turned = r * math.cos(q) + self.cross @ r * math.sin(q) + self.axis * (self.axis @ r) * (1 - math.cos(q))
         return self.origin + turned
 
     def square(self, q):
         """Unit direction in which opening moves the handle."""
-        along = np.cross(self.axis, self.at(self.handle, q) - self.origin) if self.turns else self.axis
+        along = self.cross @ (self.at(self.handle, q) - self.origin) if self.turns else self.axis
         return along / np.linalg.norm(along)
 
     @functools.cached_property

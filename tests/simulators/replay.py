@@ -98,7 +98,7 @@ def track(engine, clip, law):
     for i in range(steps):
         q, speed = engine.state(part.name)
         at = part.at(clip.grip, q)
-        velocity = speed * (np.cross(part.axis, at - part.origin) if part.turns else part.axis)
+        velocity = speed * (part.cross @ (at - part.origin) if part.turns else part.axis)
         now, then = hand(i * dt), hand((i + 1) * dt)
         engine.step((part, law.force(now - at, (then - now) / dt - velocity, damping), at))
         squares += float(np.sum((then - part.at(clip.grip, engine.state(part.name)[0])) ** 2))

@@ -34,7 +34,7 @@ class Drake(Posed, Engine):
     simulator = "Drake"
     version = importlib.metadata.version("drake")
     has_friction = False
-    most = 4
+    most = 2
     harmless = {
         "does not currently support non-zero joint friction": "friction is for the engines that have it",
         "tag '(light|site|keyframe|visual)' found .* unsupported": "of no effect on the physics",
