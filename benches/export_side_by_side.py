@@ -147,15 +147,11 @@ def measure(args, folder):
 
     wall = lambda key: median([w for w, _ in own[key]])
     core = lambda key: median([c for _, c in own[key]])
-    # A process reads the twin and writes some formats; all reads are alike, so that five processes of one format read
-    # four times more often than one process of five.
-    reading = max(0.0, (sum(core(k) for k in FORMATS) - core("all")) / (len(FORMATS) - 1))
     theirs = lambda *keys: None if not lib else sum(median(lib[k]) for k in keys)
     rows = [
         ("joints.json to a twin and five formats", wall("joints"), theirs("build", "urdf", "usda", "glb")),
         ("twin.json to five formats", wall("all"), theirs("urdf", "usda", "glb")),
         ("the same, processor time", core("all"), None),
-        ("of that without reading twin.json", core("all") - reading, None),
     ]
     peers = {"urdf": "urdf", "gltf": "glb", "usd": "usda"}
     rows += [(f"twin.json to {k}", wall(k), theirs(peers[k]) if k in peers else None) for k in FORMATS]
