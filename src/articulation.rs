@@ -71,6 +71,24 @@ impl Articulation {
         }
     }
 
+    /// Metres that a point at `p` goes for each unit of opening: its distance from a hinge; 1 for a slide.
+    #[must_use]
+    pub fn lever(&self, p: &Point) -> f64 {
+        match self.kind {
+            JointKind::Revolute => self.line().distance(p),
+            JointKind::Prismatic => 1.0,
+        }
+    }
+
+    /// What a force (N) at a point does along the joint: torque about a hinge, N m; force along a slide, N. Positive opens.
+    #[must_use]
+    pub fn effort(&self, at: &Point, force: &Vector) -> f64 {
+        match self.kind {
+            JointKind::Revolute => self.axis.dot(&(at - self.origin).cross(force)),
+            JointKind::Prismatic => self.axis.dot(force),
+        }
+    }
+
     /// The same joint with the other sense of opening.
     #[must_use]
     pub fn reversed(self) -> Self {

@@ -255,6 +255,17 @@ pub fn mass_properties(solids: &[Solid], density: f64) -> Option<MassProperties>
     Some(MassProperties { mass, center: Point::from(center), inertia: (inertia + inertia.transpose()) * 0.5 })
 }
 
+impl Part {
+    /// Whether its weight (boxes of `density`, kg/m^3) overcomes its friction when it is closed and no spring carries it.
+    #[must_use]
+    pub fn opens_by_itself(&self, up: &Vector, density: f64) -> bool {
+        mass_properties(&self.solids, density).is_some_and(|mass| {
+            let weight = up * (-9.81 * mass.mass);
+            self.joint.articulation.effort(&mass.center, &weight) > self.joint.friction
+        })
+    }
+}
+
 impl Joint {
     /// The most force (N) or torque (N m) an actuator or a person may apply through the joint.
     #[must_use]

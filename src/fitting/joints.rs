@@ -10,7 +10,7 @@ use crate::articulation::{Articulation, JointKind};
 use crate::config;
 use crate::error::{Error, Result};
 use crate::geometry::Face;
-use crate::geometry::moved::Rect;
+use crate::geometry::Rect;
 use crate::math::{Point, Vector, reject, unit};
 use crate::pipeline::SceneJoint;
 use crate::twin::{Furniture, LeftOut, OrientedBox, Role, Solid, Twin};

@@ -250,7 +250,8 @@ pub(super) fn beyond_observed(furniture: &mut [Furniture], room: &[Solid]) {
 
 /// Whether a part's weight has to be carried by a spring: hinges that are not upright only.
 ///
-/// A leaf that its weight opens from the first crack (hinged below: ovens, dishwashers) would never stay shut without one. A
+/// A leaf that its weight opens when it is shut or a crack open (hinged below: ovens, dishwashers; hung from a line before
+/// its middle) would never stay shut without one. A
 /// leaf that its weight shuts (flaps, lids) has one where a hand let go of it open and it stayed: `left_open` lists the
 /// openings, rad, at which that was seen.
 pub(super) fn balanced(part: &Part, up: &Vector, density: f64, left_open: &[f64]) -> bool {
@@ -265,7 +266,9 @@ pub(super) fn balanced(part: &Part, up: &Vector, density: f64, left_open: &[f64]
     let Some(mass) = crate::twin::mass_properties(&part.solids, density) else { return false };
     // Torque for each newton of weight; positive opens.
     let lever = |q: f64| phi.axis.dot(&(phi.motion(q) * mass.center - phi.origin).cross(&-up));
-    lever(AJAR_RAD) > LEVER_M || left_open.iter().any(|&q| q > 4.0 * AJAR_RAD && lever(q) < -LEVER_M)
+    part.opens_by_itself(up, density)
+        || lever(AJAR_RAD) > LEVER_M
+        || left_open.iter().any(|&q| q > 4.0 * AJAR_RAD && lever(q) < -LEVER_M)
 }
 
 #[cfg(test)]
@@ -398,5 +401,8 @@ mod tests {
         assert!(balanced(&oven, &up, 700.0, &[]));
         assert!(!balanced(&flap, &up, 700.0, &[]) && balanced(&flap, &up, 700.0, &[1.2]));
         assert!(!balanced(&piece(JointKind::Revolute, 1.0, 1.6).part, &up, 700.0, &[1.2]));
+        // Hung from its front edge its middle is behind the hinge: friction holds it, or it stands ajar.
+        flap.joint.friction = 0.2;
+        assert!(balanced(&flap, &up, 700.0, &[]));
     }
 }

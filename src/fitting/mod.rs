@@ -12,7 +12,7 @@ use nalgebra::Matrix3;
 use crate::articulation::{Articulation, JointKind};
 use crate::config;
 use crate::geometry::Face;
-use crate::geometry::moved::Rect;
+use crate::geometry::Rect;
 use crate::hands::Trajectory;
 use crate::math::{Vector, any_orthogonal, reject, unit};
 use crate::pipeline::{Scene, SceneJoint};
@@ -71,14 +71,12 @@ pub fn fit(scene: &Scene, up: &Vector, config: &config::Fitting) -> Twin {
     let mut ranked: Vec<(usize, usize, Furniture)> =
         placed.into_iter().enumerate().map(|(rank, (i, f))| (i, rank, f)).collect();
     ranked.sort_by_key(|(i, ..)| *i);
-    let ranks: Vec<usize> = ranked.iter().map(|(_, rank, _)| *rank).collect();
-    let joints: Vec<&SceneJoint> = ranked.iter().map(|(i, ..)| plans[*i].joint).collect();
+    let mut ranks: Vec<usize> = ranked.iter().map(|(_, rank, _)| *rank).collect();
+    let mut joints: Vec<&SceneJoint> = ranked.iter().map(|(i, ..)| plans[*i].joint).collect();
     let mut furniture: Vec<Furniture> = ranked.into_iter().map(|(.., f)| f).collect();
 
     // The room leaves free where parts were seen to go, and limits what nobody saw.
     limits::before_neighbours(&mut furniture, config);
-    let mut joints = joints;
-    let mut ranks = ranks;
     // A part that its neighbours hold shut is wrong about where it is: it goes, and what it held is free.
     while let Some(&worst) = limits::within_observed(&mut furniture, &ranks).iter().max_by_key(|&&i| ranks[i]) {
         left_out.push(LeftOut {

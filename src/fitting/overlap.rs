@@ -6,7 +6,7 @@ use parry3d::shape::Cuboid;
 
 use crate::config;
 use crate::geometry::Face;
-use crate::geometry::moved::Rect;
+use crate::geometry::Rect;
 use crate::twin::{Furniture, OrientedBox};
 
 /// Overlap below this is contact, not shared space, metres.

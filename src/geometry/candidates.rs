@@ -3,7 +3,7 @@
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
-use super::moved::Rect;
+use super::face::Rect;
 use super::{Face, LineTrack, ManhattanFrame};
 use crate::articulation::{Articulation, JointKind};
 use crate::config;

@@ -48,6 +48,21 @@ impl Face {
     }
 }
 
+/// A rectangle in face coordinates, metres: `[right, up][min, max]`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Rect {
+    /// `[[right_min, right_max], [up_min, up_max]]`.
+    pub bounds: [[f64; 2]; 2],
+}
+
+impl Rect {
+    /// Width (along right) and height (along up).
+    #[must_use]
+    pub fn size(&self) -> [f64; 2] {
+        self.bounds.map(|b| b[1] - b[0])
+    }
+}
+
 /// Points this near to the grip vote for the face's plane.
 const NEIGHBOURHOOD_M: f64 = 0.45;
 

@@ -7,10 +7,11 @@ pub mod face;
 pub mod manhattan;
 pub mod moved;
 pub mod openings;
+pub mod outline;
 pub mod segments;
 pub mod tracks;
 
 pub use candidates::{AxisCandidate, AxisSource, HingeSide};
-pub use face::Face;
+pub use face::{Face, Rect};
 pub use manhattan::ManhattanFrame;
 pub use tracks::LineTrack;

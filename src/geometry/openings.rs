@@ -7,7 +7,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::Face;
-use super::moved::{Hold, Rect, Sights, View};
+use super::face::Rect;
+use super::moved::{GRAZING, Hold, Sights, View};
 use crate::articulation::{Articulation, JointKind};
 use crate::math::{Point, Vector, any_orthogonal, reject, unit};
 
@@ -62,13 +63,13 @@ const INDEPENDENT: f64 = 30.0;
 const PLANE_STD_M: f64 = 0.015;
 /// Degrees of freedom of the hand's error: few, as some hands are lost before a part is closed.
 const TAIL: f64 = 2.0;
+/// Hands hold doors no nearer to their hinge than this, metres.
+pub const LEAST_LEVER_M: f64 = 0.1;
 /// Points of the leaf that are compared, each way.
 const STEPS: usize = 14;
 /// Beyond this a view looks past the leaf or at what hides it, metres: loose while the opening is unsure, then tight.
 const LOOSE_M: f64 = 0.08;
 const TIGHT_M: f64 = 0.03;
-/// A leaf seen at less than this slant (cosine) shows its edge.
-const GRAZING: f64 = 0.2;
 
 /// One view of one clip with the opening that the hand gives.
 struct Seen<'a> {
@@ -81,10 +82,7 @@ struct Seen<'a> {
 /// Fits the hinge and the opening in every view. `None` where no view sees enough of the leaf in motion.
 #[must_use]
 pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState], noise: &Noise) -> Option<Refit> {
-    let lever = |clip: &OpenState| match joint.kind {
-        JointKind::Prismatic => 1.0,
-        JointKind::Revolute => joint.line().distance(&clip.grip).max(0.1),
-    };
+    let lever = |clip: &OpenState| joint.lever(&clip.grip).max(LEAST_LEVER_M);
     let seen: Vec<Vec<Seen>> = clips
         .iter()
         .map(|clip| {
@@ -335,4 +333,55 @@ fn normal_equations(
         }
     }
     matrix.iter().all(|x: &f64| x.is_finite()).then_some(Equations { matrix, vector, points })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::moved::drawn;
+    use super::*;
+
+    const NOISE: Noise = Noise { hinge_m: 0.03, board_m: 0.018 };
+
+    fn door() -> Articulation {
+        Articulation { kind: JointKind::Revolute, axis: -Vector::z(), origin: Point::new(-0.25, 0.0, 0.0) }
+    }
+
+    /// The fit of `believed` to one view of `joint` at `opening`, of which the hand tells `told`.
+    fn fitted(joint: &Articulation, opening: f64, believed: &Articulation, told: f64, eye: Point) -> Option<Refit> {
+        let pose = drawn::pose(eye);
+        let sketch = drawn::sketch(&pose, joint, opening);
+        let grip = drawn::face().center;
+        let views = [drawn::view(&sketch, &pose, believed.motion(told) * grip)];
+        let clips = [OpenState { grip, grip_std_m: 0.03, views: &views }];
+        refit(&drawn::face(), &drawn::rect(), believed, &clips, &NOISE)
+    }
+
+    #[test]
+    fn an_open_leaf_corrects_the_hand_and_the_hinge() {
+        let believed = Articulation { origin: Point::new(-0.23, 0.0, 0.0), ..door() };
+        let fit = fitted(&door(), 0.7, &believed, 0.8, Point::new(0.5, -1.0, 0.4)).unwrap();
+        let found = fit.openings[0][0];
+        assert!((found.value - 0.7).abs() < 0.03 && found.informed, "{found:?}");
+        let off = door().line().distance(&fit.joint.origin);
+        assert!(off < 0.012, "{off}");
+        assert!(fit.position_std_m < NOISE.hinge_m);
+    }
+
+    #[test]
+    fn a_drawer_is_as_far_out_as_it_is_seen() {
+        let drawer = Articulation { kind: JointKind::Prismatic, axis: -Vector::y(), origin: Point::origin() };
+        let fit = fitted(&drawer, 0.3, &drawer, 0.36, Point::new(0.2, -1.3, 0.5)).unwrap();
+        let found = fit.openings[0][0];
+        assert!((found.value - 0.3).abs() < 0.01 && found.informed, "{found:?}");
+        assert_eq!((fit.joint, fit.position_std_m), (drawer, 0.0));
+    }
+
+    #[test]
+    fn a_leaf_that_is_seen_edge_on_or_not_at_all_leaves_the_hands_word() {
+        // The eye in the plane of the leaf.
+        let along = door().motion(0.7).rotation * Vector::x();
+        let eye = door().origin + along * 1.5 + Vector::z() * 0.2;
+        assert!(fitted(&door(), 0.7, &door(), 0.75, eye).is_none());
+        assert!(refit(&drawn::face(), &drawn::rect(), &door(), &[], &NOISE).is_none());
+    }
 }

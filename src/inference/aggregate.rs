@@ -4,7 +4,7 @@ use super::mean_direction;
 use crate::articulation::{Action, Articulation, JointKind};
 use crate::config;
 use crate::geometry::Face;
-use crate::geometry::moved::Rect;
+use crate::geometry::Rect;
 use crate::math::{Point, Vector, signed_angle, unsigned_angle};
 
 /// What tells whether two clips show one part.

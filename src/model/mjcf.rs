@@ -373,19 +373,7 @@ impl Builder {
     }
 
     fn link(&mut self, name: String) -> usize {
-        self.model.links.push(Link {
-            name,
-            mass: None,
-            mass_source: MassSource::Nothing,
-            center: Point::origin(),
-            inertia: Matrix3::zeros(),
-            shapes: Vec::new(),
-            meshes: Vec::new(),
-            collides_as_mesh: false,
-            incomplete: false,
-            sites: Vec::new(),
-            between: false,
-        });
+        self.model.links.push(Link::named(name));
         self.portions.push(Vec::new());
         self.model.links.len() - 1
     }

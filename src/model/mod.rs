@@ -99,6 +99,26 @@ pub struct Link {
     pub between: bool,
 }
 
+impl Link {
+    /// A link of which no more is known than its name.
+    #[must_use]
+    pub fn named(name: String) -> Self {
+        Self {
+            name,
+            mass: None,
+            mass_source: MassSource::Nothing,
+            center: Point::origin(),
+            inertia: Matrix3::zeros(),
+            shapes: Vec::new(),
+            meshes: Vec::new(),
+            collides_as_mesh: false,
+            incomplete: false,
+            sites: Vec::new(),
+            between: false,
+        }
+    }
+}
+
 /// A box of a link.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shape {
@@ -461,19 +481,7 @@ mod tests {
     }
 
     fn model(joints: Vec<ModelJoint>) -> Model {
-        let link = |name: &str| Link {
-            name: name.to_owned(),
-            mass: None,
-            mass_source: MassSource::Nothing,
-            center: Point::origin(),
-            inertia: Matrix3::zeros(),
-            shapes: Vec::new(),
-            meshes: Vec::new(),
-            collides_as_mesh: false,
-            incomplete: false,
-            sites: Vec::new(),
-            between: false,
-        };
+        let link = |name: &str| Link::named(name.to_owned());
         Model {
             name: "m".to_owned(),
             source: PathBuf::from("m.urdf"),

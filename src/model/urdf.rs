@@ -95,19 +95,7 @@ fn pose(parent: &Element) -> Result<Pose> {
 }
 
 fn link(path: &Path, element: &Element, notes: &mut Vec<String>) -> Result<Link> {
-    let mut link = Link {
-        name: element.own_name()?,
-        mass: None,
-        mass_source: MassSource::Nothing,
-        center: Point::origin(),
-        inertia: Matrix3::zeros(),
-        shapes: Vec::new(),
-        meshes: Vec::new(),
-        collides_as_mesh: false,
-        incomplete: false,
-        sites: Vec::new(),
-        between: false,
-    };
+    let mut link = Link::named(element.own_name()?);
     if let Some(inertial) = element.child("inertial") {
         let place = pose(inertial)?;
         link.mass = inertial.child("mass").map(|m| m.number("value")).transpose()?.flatten();

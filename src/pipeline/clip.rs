@@ -6,9 +6,9 @@ use super::{ClipResult, Looks};
 use crate::articulation::Outcome;
 use crate::config::{Config, InferenceMethod, LineMethod};
 use crate::error::Result;
-use crate::geometry::moved::{self, Rect};
+use crate::geometry::Rect;
 use crate::geometry::segments::LiftedSegment;
-use crate::geometry::{Face, LineTrack, ManhattanFrame, candidates, face, tracks};
+use crate::geometry::{Face, LineTrack, ManhattanFrame, candidates, face, moved, outline, tracks};
 use crate::hands::{self, Trajectory};
 use crate::inference;
 use crate::localization::{self, Region, views};
@@ -137,7 +137,7 @@ pub(super) fn infer(
     let open = moved::open_views(recording, &seen.looks.sketches, clip, trajectory);
     let stops = result.face.as_ref().map_or_else(Vec::new, |f| edges_on(f, &result.lines));
     if let Some(face) = &result.face {
-        result.part = moved::vote(face, &surface, &open, None, &config.fitting).moving_rect(&stops);
+        result.part = outline::vote(face, &surface, &open, None, &config.fitting).moving_rect(&stops);
     }
     result.candidates = candidates::collect(
         &candidates::Evidence {
@@ -193,7 +193,7 @@ pub(super) fn infer(
     };
     // With the joint known, the part is also seen where the joint puts it: the rectangle again, from all evidence.
     if let (Some(face), Outcome::Found(joint)) = (&result.face, &result.joint) {
-        let votes = moved::vote(
+        let votes = outline::vote(
             face,
             &surface,
             &open,
@@ -228,7 +228,7 @@ pub(super) fn surface(
     points
 }
 
-/// Lines on a face that run along one of its axes, as [`moved::CellVotes::moving_rect`] takes them.
+/// Lines on a face that run along one of its axes, as [`outline::CellVotes::moving_rect`] takes them.
 pub(super) fn edges_on(face: &Face, lines: &[LineTrack]) -> Vec<(usize, f64, [f64; 2])> {
     lines
         .iter()

@@ -1,6 +1,7 @@
 //! The whole paper on one screen: every step in order, every intermediate kept.
 
 mod clip;
+mod refit;
 mod room;
 mod scene;
 
@@ -12,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::articulation::{Articulation, Outcome};
 use crate::config::{Config, LineMethod};
 use crate::error::{Error, Result};
-use crate::geometry::moved::Rect;
+use crate::geometry::Rect;
 use crate::geometry::segments::{LiftedSegment, LineDetector, lift};
 use crate::geometry::{AxisCandidate, Face, LineTrack, ManhattanFrame, depth_scale, manhattan, tracks};
 use crate::hands::Trajectory;

@@ -47,6 +47,21 @@ pub struct TrueClip {
     pub noun: String,
 }
 
+impl TrueClip {
+    /// A narration that moves no joint, at a frame.
+    pub(super) fn distraction(frame: usize) -> Self {
+        Self {
+            span: [frame, frame],
+            true_span: [frame, frame],
+            part: None,
+            action: None,
+            narration: "wash hands".to_owned(),
+            verb: "wash".to_owned(),
+            noun: "hands".to_owned(),
+        }
+    }
+}
+
 /// The whole take.
 #[derive(Debug, Clone, Default)]
 pub struct Take {
@@ -155,16 +170,7 @@ pub fn play(kitchen: &Kitchen, count: usize, hard: bool, rng: &mut Pcg64Mcg) -> 
             }
         }
         if n == 0 {
-            let at = take.frames.len() - 1;
-            take.clips.push(TrueClip {
-                span: [at, at],
-                true_span: [at, at],
-                part: None,
-                action: None,
-                narration: "wash hands".to_owned(),
-                verb: "wash".to_owned(),
-                noun: "hands".to_owned(),
-            });
+            take.clips.push(TrueClip::distraction(take.frames.len() - 1));
         }
     }
     take

@@ -215,16 +215,7 @@ impl Session<'_> {
 
     /// A narration that moves no joint.
     fn distraction(&mut self) {
-        let at = self.take.frames.len().saturating_sub(1);
-        self.take.clips.push(TrueClip {
-            span: [at, at],
-            true_span: [at, at],
-            part: None,
-            action: None,
-            narration: "wash hands".to_owned(),
-            verb: "wash".to_owned(),
-            noun: "hands".to_owned(),
-        });
+        self.take.clips.push(TrueClip::distraction(self.take.frames.len().saturating_sub(1)));
     }
 
     fn clip(&mut self, index: usize, action: Action, path: [f64; 2]) {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::world::{Contact, Surroundings, World, effort};
+use super::world::{Contact, Surroundings, World};
 use crate::articulation::{Articulation, JointKind};
 use crate::config;
 use crate::error::{Error, Result};
@@ -109,6 +109,7 @@ pub fn simulate(
     let dt = config.step_secs;
     let start = joint.opening_at(&drive.grip, &first).clamp(0.0, upper);
     let mut world = World::new(part, joint, upper, start, around, dt)?;
+    let start = world.start;
 
     let properties = mass_properties(&part.solids, around.density);
     let mass = properties.map_or(0.0, |m| m.mass);
@@ -172,7 +173,7 @@ pub fn simulate(
             continue;
         }
         let strength = force.norm();
-        let turning = effort(joint, &now, &force);
+        let turning = joint.effort(&now, &force);
         let error = target(t + dt) - now;
         let distance = error.norm();
         sum += distance * distance;

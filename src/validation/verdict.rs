@@ -365,10 +365,7 @@ fn reached(clip: &ClipCheck) -> f64 {
 fn blocked(part: &Part, clip: &ClipCheck, config: &config::Validation) -> Option<(f64, String)> {
     let joint = &part.joint;
     let kind = joint.articulation.kind;
-    let lever = match kind {
-        JointKind::Revolute => joint.articulation.line().distance(&clip.replay.grip),
-        JointKind::Prismatic => 1.0,
-    };
+    let lever = joint.articulation.lever(&clip.replay.grip);
     let lacking = (clip.observed_range - reached(clip)) * lever;
     let made_up = 2.0 * config.grip_slack_m + 2.0 * std::f64::consts::SQRT_2 * clip.noise_m.max(config.hand_std_m);
     if reached(clip) >= config.pass_range_share * clip.observed_range || lacking <= made_up {

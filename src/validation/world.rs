@@ -14,8 +14,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::articulation::{Articulation, JointKind};
 use crate::error::{Error, Result};
+use crate::fitting::overlap;
 use crate::math::{Point, Pose, Vector};
-use crate::twin::{OrientedBox, Part, Solid, Twin, mass_properties};
+use crate::twin::{OrientedBox, Part, Solid, Twin};
 
 /// What surrounds a part, world frame, everything closed.
 #[derive(Debug, Clone)]
@@ -68,28 +69,15 @@ impl<'a> Surroundings<'a> {
                 continue;
             }
             let touched = part.solids.iter().any(|s| reach.meets(&s.shape));
-            if touched || (falls_open(part, up, twin.density_kg_per_m3) && reach.overlaps(&Reach::of(part, own))) {
+            if touched
+                || ((!part.joint.balanced && part.opens_by_itself(up, twin.density_kg_per_m3))
+                    && reach.overlaps(&Reach::of(part, own)))
+            {
                 around.movable.push(part);
             }
         }
         around.fixed.extend(twin.room.iter().filter(|s| reach.meets(&s.shape)));
         around
-    }
-}
-
-/// Whether a part's weight overcomes its friction when closed: it opens by itself.
-fn falls_open(part: &Part, up: &Vector, density: f64) -> bool {
-    let joint = &part.joint;
-    let Some(mass) = mass_properties(&part.solids, density).filter(|_| !joint.balanced) else { return false };
-    let weight = up * (-9.81 * mass.mass);
-    effort(&joint.articulation, &mass.center, &weight) > joint.friction
-}
-
-/// What a force at a point does along a joint: torque about a hinge, N m; force along a slide, N.
-pub(super) fn effort(joint: &Articulation, at: &Point, force: &Vector) -> f64 {
-    match joint.kind {
-        JointKind::Revolute => joint.axis.dot(&(at - joint.origin).cross(force)),
-        JointKind::Prismatic => joint.axis.dot(force),
     }
 }
 
@@ -160,6 +148,8 @@ impl PhysicsHooks for Apart {
 
 /// A running simulation. Colliders are numbered, the moving part's first.
 pub(super) struct World<'a> {
+    /// Opening at the start, rad or m.
+    pub(super) start: f64,
     physics: PhysicsWorld,
     body: RigidBodyHandle,
     origin: Point,
@@ -179,7 +169,8 @@ fn local_pose(shape: &OrientedBox, origin: &Point) -> RapierPose {
 }
 
 impl<'a> World<'a> {
-    /// A part on `joint` (which may be a rival of its own) with the limits 0..`upper`, opened by `start`, at rest.
+    /// A part on `joint` (which may be a rival of its own) with the limits 0..`upper`, opened by `start`, at rest. Where it
+    /// would stand inside something there, it is opened as far as it can be instead.
     pub(super) fn new(
         part: &'a Part,
         joint: &Articulation,
@@ -208,6 +199,8 @@ impl<'a> World<'a> {
             neighbours.push((*neighbour, add(&theirs, false, around.density)));
         }
 
+        let apart = Apart(touching(&solids, part.solids.len(), &origin));
+        let start = free_start(&solids, part.solids.len(), joint, start, &apart);
         let body = hang(&mut physics, part, joint, upper, start, &origin, own)?;
         let room = physics.insert_body(RigidBodyBuilder::fixed());
         for collider in fixed {
@@ -217,8 +210,7 @@ impl<'a> World<'a> {
             let joint = &neighbour.joint;
             hang(&mut physics, neighbour, &joint.articulation, joint.upper, 0.0, &origin, colliders)?;
         }
-        let apart = Apart(touching(&solids, part.solids.len(), &origin));
-        Ok(Self { physics, body, origin, solids, apart, touched: BTreeMap::new(), dt })
+        Ok(Self { start, physics, body, origin, solids, apart, touched: BTreeMap::new(), dt })
     }
 
     /// The part's motion from closed about the joint's origin: how far that point of the part has gone, and the rotation.
@@ -360,6 +352,21 @@ fn hang(
         multibody.update_rigid_bodies(&mut physics.bodies, true);
     }
     Ok(body)
+}
+
+/// The largest opening up to `start` at which the moving solids (the first `moving`) share space with nothing but what they
+/// touch when closed: a simulation that begins inside something flies apart.
+fn free_start(solids: &[&Solid], moving: usize, joint: &Articulation, start: f64, apart: &Apart) -> f64 {
+    const STEPS: u32 = 60;
+    let free = |opening: f64| {
+        let motion = joint.motion(opening);
+        solids.iter().take(moving).enumerate().all(|(i, own)| {
+            let moved = own.shape.moved(&motion);
+            let mut others = solids.iter().enumerate().skip(moving);
+            others.all(|(j, other)| apart.0.contains(&(i as u128, j as u128)) || !overlap::boxes(&moved, &other.shape))
+        })
+    };
+    (0..STEPS).map(|k| start * f64::from(STEPS - k) / f64::from(STEPS)).find(|&q| free(q)).unwrap_or(0.0)
 }
 
 /// Numbers of the pairs of a moving solid (the first `moving`) and another that touch when closed.

@@ -353,3 +353,27 @@ fn furniture_in_the_way_stops_the_part() {
     let blocked = replay(vec![&wall]).reached[1];
     assert!((0.6..0.8).contains(&blocked), "{blocked}");
 }
+
+#[test]
+fn a_motion_that_begins_inside_something_begins_before_it() {
+    let furniture = door();
+    let part = &furniture.part;
+    let joint = part.joint.articulation;
+    let mut hand = hand(&joint, 1.2);
+    hand.samples.reverse();
+    let drive = Drive {
+        times_secs: (0..hand.samples.len()).map(|i| 0.05 * i as f64).collect(),
+        path: hand.positions(),
+        grip: part.handle,
+        back: true,
+    };
+    // Where the leaf stands when it is open.
+    let there = joint.motion(1.2) * part.bounds.center;
+    let block = solid("block", Role::Room, upright(there, Vector::new(0.1, 0.1, 0.5)));
+    let up = Vector::z();
+    let around = Surroundings { fixed: vec![&block], ..Surroundings::none(&up, 700.0) };
+    let replay = simulate(part, &joint, 1.6, &around, &drive, &Config::default().validation).unwrap();
+    assert!(replay.start > 0.1 && replay.start < 1.1, "{}", replay.start);
+    assert!(replay.reached[1] < 1.2 && replay.max_m < 1.0, "{:?}", replay.reached);
+    assert!(replay.worst_penetration().is_none_or(|(depth, _)| depth < 0.01));
+}

@@ -1,0 +1,327 @@
+//! Which part of the front face moved: what was there when closed and is empty, or elsewhere, when open (ours).
+//!
+//! Masks cover whole pieces of furniture; depth before and after the interaction tells the moving part from the rest
+//! without knowing the joint.
+
+use super::Face;
+use super::face::Rect;
+use super::moved::{View, tolerance};
+use crate::articulation::Articulation;
+use crate::config;
+use crate::math::Point;
+
+/// What the views say about each cell of the face.
+#[derive(Debug, Clone)]
+pub struct CellVotes {
+    cell_m: f64,
+    origin: [f64; 2],
+    columns: usize,
+    rows: usize,
+    /// Surface points on the closed plane.
+    closed: Vec<u16>,
+    /// Seen on the closed plane while open.
+    still: Vec<u16>,
+    /// Seen through while open, or seen where the moved part would be.
+    gone: Vec<u16>,
+}
+
+/// Votes of the closed surface and the open views over the face's visible extent (at most 1.2 m from the grip). With a
+/// `joint` and its opening in each view, cells also count as moved where the part is seen in its opened place.
+#[must_use]
+pub fn vote(
+    face: &Face,
+    surface: &[Point],
+    open: &[View],
+    joint: Option<(&Articulation, &[f64])>,
+    config: &config::Fitting,
+) -> CellVotes {
+    const REACH_M: f64 = 1.2;
+    // The extent comes from the confident region; its rim is a voxel coarse.
+    const MARGIN_M: f64 = 0.1;
+    let low = [0, 1].map(|i| (face.extent[i][0] - MARGIN_M).max(-REACH_M));
+    let high = [0, 1].map(|i| (face.extent[i][1] + MARGIN_M).min(REACH_M));
+    let columns = ((high[0] - low[0]) / config.cell_m).ceil().max(1.0) as usize;
+    let rows = ((high[1] - low[1]) / config.cell_m).ceil().max(1.0) as usize;
+    let mut votes = CellVotes {
+        cell_m: config.cell_m,
+        origin: low,
+        columns,
+        rows,
+        closed: vec![0; columns * rows],
+        still: vec![0; columns * rows],
+        gone: vec![0; columns * rows],
+    };
+    // Metric depth bends and scales by a few per cent: far from the grip a face's points leave its plane by this much.
+    const FACE_M: f64 = 0.06;
+    for p in surface {
+        let [right, up, out] = face.coordinates(p);
+        if let Some(i) = votes.index(right, up)
+            && out.abs() <= FACE_M
+        {
+            votes.closed[i] = votes.closed[i].saturating_add(1);
+        }
+    }
+    for i in 0..columns * rows {
+        let [right, up] = votes.cell(i % columns, i / columns);
+        let here = face.point(right, up, 0.0);
+        for (v, view) in open.iter().enumerate() {
+            if let Some((gap, z)) = view.gap(&here) {
+                votes.still[i] += u16::from(gap.abs() <= tolerance(z));
+                // Seen through by clearly more than a door's thickness.
+                votes.gone[i] += u16::from(gap > tolerance(z) + 0.04);
+            }
+            let Some((joint, opening)) = joint.and_then(|(joint, openings)| Some((joint, *openings.get(v)?))) else {
+                continue;
+            };
+            let motion = joint.motion(opening);
+            let moved = motion * here;
+            if view.grazes(&moved, &(motion.rotation * face.normal)) {
+                continue;
+            }
+            // Only where the part has moved clear of its own noise.
+            if let Some((gap, z)) = view.gap(&moved)
+                && (moved - here).norm() > 2.0 * tolerance(z)
+            {
+                votes.gone[i] += u16::from(gap.abs() <= tolerance(z));
+                votes.still[i] += u16::from(gap > tolerance(z));
+            }
+        }
+    }
+    votes
+}
+
+impl CellVotes {
+    /// Cell of face coordinates; `None` outside.
+    fn index(&self, right: f64, up: f64) -> Option<usize> {
+        let column = ((right - self.origin[0]) / self.cell_m).floor();
+        let row = ((up - self.origin[1]) / self.cell_m).floor();
+        let inside = column >= 0.0 && row >= 0.0 && column < self.columns as f64 && row < self.rows as f64;
+        inside.then(|| row as usize * self.columns + column as usize)
+    }
+
+    /// Centre of a cell in face coordinates.
+    fn cell(&self, column: usize, row: usize) -> [f64; 2] {
+        [self.origin[0] + (column as f64 + 0.5) * self.cell_m, self.origin[1] + (row as f64 + 0.5) * self.cell_m]
+    }
+
+    /// The rectangle of the connected piece of moved cells at the grip; `None` where nothing there is seen to move.
+    ///
+    /// Where no open view looked, the part goes on: over its closed face up to an edge (`stops`: lines on the face as
+    /// (0 = upright or 1 = level, offset, from, to) in face coordinates), up to what is seen to stay, or up to the face's end.
+    #[must_use]
+    pub fn moving_rect(&self, stops: &[(usize, f64, [f64; 2])]) -> Option<Rect> {
+        let seen = self.seen_rect()?;
+        Some(self.on_lines(self.grown(seen, stops), stops))
+    }
+
+    /// Moves each side of a rectangle onto the line next to it: fronts end at gaps, which are lines, while cells are coarse and
+    /// their votes blurred by the depth's noise. What lies between side and line must not speak against it.
+    fn on_lines(&self, rect: Rect, stops: &[(usize, f64, [f64; 2])]) -> Rect {
+        /// How far votes put a side from where it is: a standard deviation.
+        const SIDE_STD_M: f64 = 0.03;
+        /// What a line must be worth to be believed.
+        const LEAST: f64 = 0.25;
+        let mut bounds = rect.bounds;
+        for axis in [0, 1] {
+            let across = rect.bounds[1 - axis];
+            let length = across[1] - across[0];
+            for side in [0, 1] {
+                let edge = rect.bounds[axis][side];
+                let worth = |offset: f64, span: [f64; 2]| -> f64 {
+                    let covered = ((span[1].min(across[1]) - span[0].max(across[0])) / length).clamp(0.0, 1.0);
+                    let outward = (offset - edge) * if side == 0 { -1.0 } else { 1.0 };
+                    let [from, to] = if offset < edge { [offset, edge] } else { [edge, offset] };
+                    let against = self.against(axis, [from, to], across, outward > 0.0);
+                    covered * (-0.5 * ((offset - edge) / SIDE_STD_M).powi(2)).exp() * (1.0 - against)
+                };
+                let best = stops
+                    .iter()
+                    .filter(|(a, ..)| *a == axis)
+                    .map(|(_, offset, span)| (worth(*offset, *span), *offset))
+                    .max_by(|a, b| a.0.total_cmp(&b.0));
+                if let Some((worth, offset)) = best
+                    && worth > LEAST
+                {
+                    bounds[axis][side] = offset;
+                }
+            }
+        }
+        // Two sides on one line are no rectangle.
+        if bounds.iter().any(|b| b[1] - b[0] < 0.05) { rect } else { Rect { bounds } }
+    }
+
+    /// Of the cells of a strip that open views saw, the share that was seen to stay (for a strip to be added) or to move (for
+    /// one to be taken away).
+    fn against(&self, axis: usize, strip: [f64; 2], across: [f64; 2], added: bool) -> f64 {
+        let steps = |b: [f64; 2]| ((b[1] - b[0]) / self.cell_m).floor().max(0.0) as usize;
+        let (mut seen, mut against) = (0usize, 0usize);
+        for i in 0..steps(strip) {
+            for k in 0..steps(across) {
+                let (x, y) = (strip[0] + (i as f64 + 0.5) * self.cell_m, across[0] + (k as f64 + 0.5) * self.cell_m);
+                let Some(cell) = (if axis == 0 { self.index(x, y) } else { self.index(y, x) }) else { continue };
+                let (still, gone) = (self.still[cell], self.gone[cell]);
+                seen += usize::from(still != gone);
+                against += usize::from(if added { still > gone } else { gone > still });
+            }
+        }
+        against as f64 / seen.max(1) as f64
+    }
+
+    /// Extends a rectangle side by side over cells that no open view saw.
+    fn grown(&self, rect: Rect, stops: &[(usize, f64, [f64; 2])]) -> Rect {
+        let mut bounds = rect.bounds;
+        for axis in [0, 1] {
+            let across = bounds[1 - axis];
+            let count = ((across[1] - across[0]) / self.cell_m).round().max(1.0) as usize;
+            for (side, sign) in [(0, -1.0), (1, 1.0)] {
+                loop {
+                    let edge = bounds[axis][side];
+                    let next = edge + sign * 0.5 * self.cell_m;
+                    let cells: Vec<usize> = (0..count)
+                        .filter_map(|k| {
+                            let along = across[0] + (k as f64 + 0.5) * self.cell_m;
+                            if axis == 0 { self.index(next, along) } else { self.index(along, next) }
+                        })
+                        .collect();
+                    // Half of the edge's length must be face, and less than half of it seen to stay (beside a hinge a
+                    // door hardly moves).
+                    let face = cells.iter().filter(|&&i| self.closed[i] > 0).count();
+                    let known = cells.iter().filter(|&&i| self.still[i] > 0).count();
+                    let stopped = stops.iter().any(|(a, offset, span)| {
+                        let covers = span[1].min(across[1]) - span[0].max(across[0]);
+                        *a == axis && (offset - edge).abs() <= self.cell_m && covers > 0.4 * (across[1] - across[0])
+                    });
+                    if stopped || 2 * face < count || 2 * known > count {
+                        break;
+                    }
+                    bounds[axis][side] += sign * self.cell_m;
+                }
+            }
+        }
+        Rect { bounds }
+    }
+
+    fn seen_rect(&self) -> Option<Rect> {
+        // A front of 15 x 15 cm is the smallest drawer.
+        const MIN_AREA_M2: f64 = 0.02;
+        let moving: Vec<bool> =
+            (0..self.closed.len()).map(|i| self.gone[i] > self.still[i] && self.closed[i] > 0).collect();
+        let piece = self.piece_at_grip(&moving)?;
+        if piece.len() as f64 * self.cell_m * self.cell_m < MIN_AREA_M2 {
+            return None;
+        }
+        let (mut by_column, mut by_row) = (vec![0usize; self.columns], vec![0usize; self.rows]);
+        for &i in &piece {
+            by_column[i % self.columns] += 1;
+            by_row[i / self.columns] += 1;
+        }
+        // A rectangle's rows are equally full: rows with under a third of the fullest are fringe.
+        let span = |counts: &[usize], origin: f64| -> Option<[f64; 2]> {
+            let limit = counts.iter().max()? / 3;
+            let first = counts.iter().position(|&c| c > limit)?;
+            let last = counts.iter().rposition(|&c| c > limit)?;
+            Some([origin + first as f64 * self.cell_m, origin + (last + 1) as f64 * self.cell_m])
+        };
+        Some(Rect { bounds: [span(&by_column, self.origin[0])?, span(&by_row, self.origin[1])?] })
+    }
+
+    /// The 4-connected piece of marked cells nearest to the grip (the face's origin), if within 25 cm of it.
+    fn piece_at_grip(&self, marked: &[bool]) -> Option<Vec<usize>> {
+        const NEAR_M: f64 = 0.25;
+        let distance = |i: usize| {
+            let [r, u] = self.cell(i % self.columns, i / self.columns);
+            r.hypot(u)
+        };
+        let mut taken = vec![false; marked.len()];
+        let mut best: Option<Vec<usize>> = None;
+        for start in 0..marked.len() {
+            if !marked[start] || taken[start] || distance(start) > NEAR_M {
+                continue;
+            }
+            taken[start] = true;
+            let mut piece = vec![start];
+            let mut next = 0;
+            while let Some(&i) = piece.get(next) {
+                next += 1;
+                let (c, r) = (i % self.columns, i / self.columns);
+                let neighbours = [
+                    (c > 0).then(|| i - 1),
+                    (c + 1 < self.columns).then(|| i + 1),
+                    (r > 0).then(|| i - self.columns),
+                    (r + 1 < self.rows).then(|| i + self.columns),
+                ];
+                for n in neighbours.into_iter().flatten() {
+                    if marked[n] && !taken[n] {
+                        taken[n] = true;
+                        piece.push(n);
+                    }
+                }
+            }
+            // Noise makes islands: of the pieces near the grip the largest is the part.
+            if best.as_ref().is_none_or(|b| piece.len() > b.len()) {
+                best = Some(piece);
+            }
+        }
+        best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A face of 2 cm cells, seen closed all over, with nothing known of the open state.
+    fn votes(columns: usize, rows: usize) -> CellVotes {
+        let cells = columns * rows;
+        CellVotes {
+            cell_m: 0.02,
+            origin: [-0.4, -0.3],
+            columns,
+            rows,
+            closed: vec![1; cells],
+            still: vec![0; cells],
+            gone: vec![0; cells],
+        }
+    }
+
+    #[test]
+    fn fringe_and_islands_do_not_widen_the_part() {
+        let (columns, rows) = (40, 30);
+        let mut votes = votes(columns, rows);
+        votes.still.fill(1);
+        for r in 5..25 {
+            for c in 10..30 {
+                votes.gone[r * columns + c] = 3;
+            }
+        }
+        for c in 30..38 {
+            votes.gone[15 * columns + c] = 3;
+        }
+        votes.gone[2 * columns + 2] = 9;
+        let rect = votes.moving_rect(&[]).unwrap();
+        for (found, expected) in rect.bounds.iter().flatten().zip([-0.2, 0.2, -0.2, 0.2]) {
+            assert!((found - expected).abs() < 1e-9, "{rect:?}");
+        }
+        votes.gone.fill(0);
+        assert!(votes.moving_rect(&[]).is_none());
+    }
+
+    #[test]
+    fn a_part_goes_on_where_nobody_looked_until_an_edge() {
+        let (columns, rows) = (40, 60);
+        let mut votes = votes(columns, rows);
+        for r in 0..60 {
+            for c in 0..40 {
+                let inside = (10..30).contains(&c) && (5..25).contains(&r);
+                votes.gone[r * columns + c] = u16::from(inside) * 3;
+                // Beside and below it the furniture is seen to stay; nobody looked up.
+                votes.still[r * columns + c] = u16::from(!inside && r < 25) * 3;
+            }
+        }
+        let line = [(1, 0.54, [-0.5, 0.5])];
+        let rect = votes.moving_rect(&line).unwrap();
+        for (found, expected) in rect.bounds.iter().flatten().zip([-0.2, 0.2, -0.2, 0.54]) {
+            assert!((found - expected).abs() < 0.021, "{rect:?}");
+        }
+    }
+}
