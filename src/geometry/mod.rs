@@ -10,6 +10,7 @@ pub mod openings;
 pub mod outline;
 pub mod segments;
 pub mod tracks;
+mod triangulation;
 
 pub use candidates::{AxisCandidate, AxisSource, HingeSide};
 pub use face::{Face, Rect};

@@ -9,7 +9,9 @@ pub mod furniture;
 pub mod glb;
 mod mesh;
 pub mod mjcf;
+mod mjcf_context;
 mod shapes;
+mod sweep;
 pub mod urdf;
 mod xml;
 
