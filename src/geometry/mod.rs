@@ -8,7 +8,9 @@ pub mod manhattan;
 pub mod moved;
 pub mod openings;
 pub mod outline;
+mod rays;
 pub mod segments;
+pub mod sights;
 pub mod tracks;
 mod triangulation;
 

@@ -1,10 +1,7 @@
-//! What views of the open state say about a joint: is the part where the joint puts it, and gone from where it was (ours)?
+//! The views in which a part stands open, and where the hand has it in them (ours).
 
-use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
-use super::Face;
-use super::face::Rect;
 use crate::articulation::{Action, Articulation};
 use crate::hands::Trajectory;
 use crate::math::{Point, Pose, Vector};
@@ -55,6 +52,21 @@ impl View<'_> {
     /// Whether a surface at `p` with this normal is seen edge-on: a small error of its place is a large one of its depth.
     pub(super) fn grazes(&self, p: &Point, normal: &Vector) -> bool {
         crate::math::unit(&(p - self.eye)).is_none_or(|ray| normal.dot(&ray).abs() < GRAZING)
+    }
+
+    /// Calls `take` with the direction in the world, per metre of depth, and the depth (metres) of every sample that has one.
+    pub(super) fn each_depth(&self, mut take: impl FnMut(Vector, f64)) {
+        let world_from_camera = self.camera_from_world.inverse();
+        let grid = &self.sketch.depth;
+        for y in 0..grid.height {
+            for x in 0..grid.width {
+                let z = f64::from(grid.data[y * grid.width + x]) * self.factor;
+                if z > 0.0 {
+                    let (u, v) = self.sketch.pixel(x, y);
+                    take(world_from_camera * self.camera.unproject(u, v, 1.0).coords, z);
+                }
+            }
+        }
     }
 
     /// How far behind the world point `p` the seen surface lies (negative: in front of it), and the depth of `p`.
@@ -151,136 +163,8 @@ pub fn open_views<'a>(
         .collect()
 }
 
-/// How well a joint explains the open views: of the face's points that it moves clearly, the share that is seen where it
-/// puts them rather than seen through there, and no longer where they were; and the number of such sights.
-///
-/// Hands and depth disagree by a few centimetres that stay the same over a clip (a hand's distance is the least certain thing
-/// about it): the opening that the hand tells is taken with an offset of its own, the one that explains most, less what so
-/// large an offset is believed in. `grip_std_m` is the spread of the offsets, metres.
-#[must_use]
-pub fn agreement(sights: &Sights, joint: &Articulation, grip: &Point, grip_std_m: f64) -> (f64, usize) {
-    /// Between two offsets, metres: what the depth's tolerance bridges.
-    const STEP_M: f64 = 0.02;
-    /// Half a squared standard deviation against the log likelihood that the whole share is worth to the reasoner.
-    const SHARE_PER_NAT: f64 = 1.0 / 18.0;
-    let lever = joint.lever(grip).max(0.05);
-    // Where a hand was lost before it let go, the views after that have an offset of their own.
-    let of = |hold: Hold| -> (f64, usize) {
-        let std_m = hold.std_m(grip_std_m);
-        let at = |offset: f64| -> (f64, usize) {
-            let (share, count) = seen_share(sights, joint, grip, hold, offset / lever);
-            ((share - SHARE_PER_NAT * 0.5 * (offset / std_m).powi(2)).max(0.0), count)
-        };
-        // An offset under which nothing moves clearly explains nothing; of equal offsets the first is kept.
-        let better = |best: (f64, (f64, usize)), offset: f64| -> (f64, (f64, usize)) {
-            let found = at(offset);
-            let order = (found.1 >= MIN_POINTS, found.0).partial_cmp(&(best.1.1 >= MIN_POINTS, best.1.0));
-            if order == Some(Ordering::Greater) { (offset, found) } else { best }
-        };
-        // Two standard deviations to each side, from the middle outwards: far reaches by double steps first.
-        let stride = if std_m > 2.0 * STEP_M { 2.0 * STEP_M } else { STEP_M };
-        let reach = (2.0 * std_m / stride).round() as i32;
-        let mut best = (0.0, at(0.0));
-        for k in 1..=reach {
-            best = better(better(best, -f64::from(k) * stride), f64::from(k) * stride);
-        }
-        if stride > STEP_M {
-            let middle = best.0;
-            best = better(better(best, middle - STEP_M), middle + STEP_M);
-        }
-        best.1
-    };
-    let (mut explained, mut count) = (0.0, 0);
-    for hold in Hold::ALL.into_iter().filter(|h| sights.views.iter().any(|v| v.hold == *h)) {
-        let (share, points) = of(hold);
-        explained += share * points as f64;
-        count += points;
-    }
-    (explained / count.max(1) as f64, count)
-}
-
-/// What [`agreement`] is worth, in nats: of the points that a right joint moves about four fifths are seen in their place, of
-/// a wrong one's about a third by chance. Neighbouring points share their fate, so all of them count as a few.
-#[must_use]
-pub fn log_likelihood((share, count): (f64, usize)) -> f64 {
-    const RIGHT: f64 = 0.8;
-    const WRONG: f64 = 0.3;
-    const INDEPENDENT: f64 = 8.0;
-    // With few points the share is noise; with none it says nothing.
-    let weight = INDEPENDENT * (count as f64 / 200.0).min(1.0);
-    weight * (share * (RIGHT / WRONG).ln() + (1.0 - share) * ((1.0 - RIGHT) / (1.0 - WRONG)).ln())
-}
-
 /// A share of fewer points is noise.
 pub const MIN_POINTS: usize = 100;
-
-/// Points of a face's part, closed, and what the open views see there: the same for every joint that it could have.
-#[derive(Debug, Clone)]
-pub struct Sights<'a> {
-    face: &'a Face,
-    bounds: [[f64; 2]; 2],
-    views: &'a [View<'a>],
-    points: Vec<Point>,
-    /// For each view and point [`View::gap`].
-    closed: Vec<Vec<Option<(f64, f64)>>>,
-}
-
-impl<'a> Sights<'a> {
-    /// A grid over the part, or over a piece of its face around the grip where the part is not known.
-    #[must_use]
-    pub fn of(face: &'a Face, rect: Option<&Rect>, views: &'a [View<'a>]) -> Self {
-        // What the smallest front has.
-        const HALF_M: f64 = 0.12;
-        const STEPS: usize = 12;
-        let bounds = rect.map_or([[-HALF_M, HALF_M]; 2], |r| r.bounds);
-        let at = |k: usize, b: [f64; 2]| b[0] + (b[1] - b[0]) * (k as f64 + 0.5) / STEPS as f64;
-        let points: Vec<Point> =
-            (0..STEPS * STEPS).map(|i| face.point(at(i % STEPS, bounds[0]), at(i / STEPS, bounds[1]), 0.0)).collect();
-        let closed = views.iter().map(|view| points.iter().map(|p| view.gap(p)).collect()).collect();
-        Self { face, bounds, views, points, closed }
-    }
-}
-
-/// The share of [`agreement`] in the views of one sort, with `offset` (rad or m) added to the opening that the hand tells.
-pub(super) fn seen_share(sights: &Sights, joint: &Articulation, grip: &Point, hold: Hold, offset: f64) -> (f64, usize) {
-    let Sights { face, bounds, .. } = sights;
-    let (mut explained, mut count) = (0usize, 0usize);
-    for (view, closed) in sights.views.iter().zip(&sights.closed).filter(|(v, _)| v.hold == hold) {
-        let motion = joint.motion(joint.opening_at(grip, &view.grip) + offset);
-        let back = motion.inverse();
-        for (here, closed) in sights.points.iter().zip(closed) {
-            let moved = motion * here;
-            let travel = (moved - here).norm();
-            // Less than twice the least tolerance is no motion anywhere.
-            if travel < 2.0 * tolerance(0.0) {
-                continue;
-            }
-            // Where it goes. Within the face there is a surface whether the part slid there or not.
-            if let Some((gap, z)) = view.gap(&moved)
-                && travel >= 2.0 * tolerance(z)
-                && gap >= -tolerance(z)
-                && face.coordinates(&moved)[2].abs() > tolerance(z)
-            {
-                count += 1;
-                explained += usize::from(gap <= tolerance(z));
-            }
-            // Where it was, unless another piece of it is there now.
-            if let Some((gap, z)) = *closed
-                && travel >= 2.0 * tolerance(z)
-                && gap >= -tolerance(z)
-            {
-                let [right, up, out] = face.coordinates(&(back * here));
-                let within = |x: f64, b: [f64; 2]| (b[0]..=b[1]).contains(&x);
-                let covered = out.abs() <= tolerance(z) && within(right, bounds[0]) && within(up, bounds[1]);
-                if !covered {
-                    count += 1;
-                    explained += usize::from(gap > tolerance(z));
-                }
-            }
-        }
-    }
-    (explained as f64 / count.max(1) as f64, count)
-}
 
 /// Depth noise that a surface at distance `z` may show: half a voxel and 2 % of the distance (metric depth estimates).
 pub(super) fn tolerance(z: f64) -> f64 {
@@ -297,6 +181,7 @@ pub fn told(joint: &Articulation, grip: &Point, views: &[View]) -> Vec<f64> {
 pub(super) mod drawn {
     //! Depth images of a leaf before the inside of its furniture and a wall, for tests.
 
+    use super::super::face::{Face, Rect};
     use super::*;
     use crate::recording::Grid;
 
@@ -365,38 +250,5 @@ pub(super) mod drawn {
             grip,
             hold: Hold::Sure,
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::articulation::JointKind;
-
-    #[test]
-    fn a_joint_explains_its_own_motion_and_a_slide_within_the_face_must_uncover_something() {
-        let origin = Point::new(-0.25, 0.0, 0.0);
-        let door = Articulation { kind: JointKind::Revolute, axis: -Vector::z(), origin };
-        let out = Articulation { kind: JointKind::Prismatic, axis: -Vector::y(), origin };
-        let aside = Articulation { axis: -Vector::x(), ..out };
-        let poses = [drawn::pose(Point::new(0.3, -1.0, 0.5)), drawn::pose(Point::new(0.1, -1.1, 0.4))];
-        let (face, rect, grip) = (drawn::face(), drawn::rect(), drawn::face().center);
-        // The part moves by `opening`, the hand by `told`; the share of `claims` and the number of sights.
-        let share = |moves: &Articulation, opening: f64, told: f64, claims: &Articulation| {
-            let sketches = poses.map(|pose| drawn::sketch(&pose, moves, opening));
-            let hand = moves.motion(told) * grip;
-            let views: Vec<View> = sketches.iter().zip(&poses).map(|(s, pose)| drawn::view(s, pose, hand)).collect();
-            agreement(&Sights::of(&face, Some(&rect), &views), claims, &grip, 0.03)
-        };
-        // Whoever claims the motion that was made explains nearly all.
-        for (joint, opening) in [(door, 0.9), (out, 0.3), (aside, 0.3)] {
-            let (own, count) = share(&joint, opening, opening, &joint);
-            assert!(own > 0.9 && count > MIN_POINTS, "{joint:?} {own} {count}");
-        }
-        let (as_slide, _) = share(&door, 0.9, 0.9, &out);
-        assert!(as_slide < 0.7, "{as_slide}");
-        // A front that stayed shut has the surface of a slide's other end, and uncovered nothing.
-        let (still, count) = share(&aside, 0.0, 0.3, &aside);
-        assert!(still < 0.1 && count > MIN_POINTS, "{still} {count}");
     }
 }

@@ -8,7 +8,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::Face;
 use super::face::Rect;
-use super::moved::{GRAZING, Hold, Sights, View};
+use super::moved::{GRAZING, Hold, View};
+use super::sights::{self, Sights};
 use crate::articulation::{Articulation, JointKind};
 use crate::math::{Point, Vector, any_orthogonal, reject, unit};
 
@@ -246,8 +247,8 @@ fn coarse(sights: &Sights, joint: &Articulation, clip: &OpenState, views: &[Seen
         .filter(|offset| widest + offset > 0.0)
         .map(|offset| {
             let x = offset / std;
-            let seen = super::moved::seen_share(sights, joint, &clip.grip, hold, offset);
-            (super::moved::log_likelihood(seen) - 0.5 * (TAIL + 1.0) * (x * x / TAIL).ln_1p(), offset)
+            let seen = sights::log_likelihood(sights::seen_share(sights, joint, &clip.grip, hold, offset));
+            (seen - 0.5 * (TAIL + 1.0) * (x * x / TAIL).ln_1p(), offset)
         })
         .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.abs().total_cmp(&a.1.abs())))
         .map_or(0.0, |(_, offset)| offset)

@@ -8,7 +8,7 @@ use crate::config::{Config, InferenceMethod, LineMethod};
 use crate::error::Result;
 use crate::geometry::Rect;
 use crate::geometry::segments::LiftedSegment;
-use crate::geometry::{Face, LineTrack, ManhattanFrame, candidates, face, moved, outline, tracks};
+use crate::geometry::{Face, LineTrack, ManhattanFrame, candidates, face, moved, outline, sights, tracks};
 use crate::hands::{self, Trajectory};
 use crate::inference;
 use crate::localization::{self, Region, views};
@@ -158,12 +158,12 @@ pub(super) fn infer(
         result.candidates =
             result.candidates.iter().map(|c| candidates::settled(c, &paths, &config.reasoning)).collect();
     }
-    let sights = result.face.as_ref().map(|face| moved::Sights::of(face, result.part.as_ref(), &open));
+    let seen_rays = result.face.as_ref().map(|face| sights::Sights::of(face, result.part.as_ref(), &open));
     let grip_std_m = hands::grip_std_m(trajectory.closed_end_seen());
-    let agreement: Vec<(f64, usize)> = result
+    let agreement: Vec<f64> = result
         .candidates
         .iter()
-        .map(|c| sights.as_ref().map_or((0.0, 0), |s| moved::agreement(s, &c.joint, &region.grip, grip_std_m)))
+        .map(|c| seen_rays.as_ref().map_or(0.0, |s| sights::agreement(s, &c.joint, &region.grip, grip_std_m)))
         .collect();
     let answer = reasoner.answer(&Question {
         reading: &located.reading,

@@ -1,6 +1,5 @@
 //! Clips of one part to one joint of the scene (§C.2).
 
-use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
@@ -11,6 +10,7 @@ use super::{ClipResult, SceneJoint};
 use crate::articulation::{Articulation, JointKind};
 use crate::config::{Config, InferenceMethod};
 use crate::geometry::Rect;
+use crate::geometry::sights::{self, Sights};
 use crate::geometry::{AxisCandidate, Face, candidates, moved, outline};
 use crate::hands::{self, Trajectory};
 use crate::inference::{self, aggregate};
@@ -148,21 +148,14 @@ fn merge_group(
             .into_iter()
             .flatten()
             .collect();
-            let contexts: Vec<(moved::Sights, Point)> =
-                contexts.iter().map(|(f, rect, grip)| (moved::Sights::of(f, rect.as_ref(), &open), *grip)).collect();
+            let contexts: Vec<(Sights, Point)> =
+                contexts.iter().map(|(f, rect, grip)| (Sights::of(f, rect.as_ref(), &open), *grip)).collect();
             let grip_std_m = hands::grip_std_m(trajectory.closed_end_seen());
-            let agreement: Vec<(f64, usize)> = pooled
+            let agreement: Vec<f64> = pooled
                 .iter()
                 .map(|k| {
-                    contexts
-                        .iter()
-                        .map(|(sights, grip)| moved::agreement(sights, &k.joint, grip, grip_std_m))
-                        // A share of few points is noise.
-                        .max_by(|a, b| {
-                            let rank = |x: &(f64, usize)| (x.1 >= moved::MIN_POINTS, x.0);
-                            rank(a).partial_cmp(&rank(b)).unwrap_or(Ordering::Equal)
-                        })
-                        .unwrap_or((0.0, 0))
+                    let of = contexts.iter().map(|(s, grip)| sights::agreement(s, &k.joint, grip, grip_std_m));
+                    of.reduce(f64::max).unwrap_or(0.0)
                 })
                 .collect();
             answers.push(reasoner.answer(&Question {

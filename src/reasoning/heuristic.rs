@@ -6,7 +6,7 @@
 
 use crate::articulation::JointKind;
 use crate::config;
-use crate::geometry::{AxisCandidate, AxisSource, Face, HingeSide, moved};
+use crate::geometry::{AxisCandidate, AxisSource, Face, HingeSide};
 use crate::math::{Vector, path};
 
 use super::words::line_factor;
@@ -31,9 +31,7 @@ impl Reasoner for Geometric {
             .candidates
             .iter()
             .zip(question.agreement)
-            .map(|(candidate, agreement)| {
-                self.path_log_likelihood(candidate, question) + moved::log_likelihood(*agreement)
-            })
+            .map(|(candidate, agreement)| self.path_log_likelihood(candidate, question) + agreement)
             .collect();
         let name = match question.reading.kind {
             Some(kind) => {
@@ -216,7 +214,7 @@ mod tests {
         }
     }
 
-    fn ask(path: &[Point], kind: Option<JointKind>, candidates: &[AxisCandidate], agreement: &[(f64, usize)]) -> f64 {
+    fn ask(path: &[Point], kind: Option<JointKind>, candidates: &[AxisCandidate], agreement: &[f64]) -> f64 {
         let reading = Reading { moves_joint: Some(true), action: None, furniture: None, kind, generic: false };
         Geometric { reasoning: config::Reasoning::default(), inference: config::Inference::default() }
             .answer(&Question {
@@ -247,11 +245,11 @@ mod tests {
             candidate(JointKind::Revolute, Vector::z(), Point::new(0.5, 0.0, 1.0), AxisSource::PartEdge),
             candidate(JointKind::Prismatic, -Vector::y(), Point::origin(), AxisSource::FaceNormal),
         ];
-        let wide = ask(&arc(75.0), Some(JointKind::Prismatic), &candidates, &[(0.0, 0); 2]);
+        let wide = ask(&arc(75.0), Some(JointKind::Prismatic), &candidates, &[0.0; 2]);
         assert!(wide > 0.9, "{wide:?}");
         let short = arc(15.0);
-        let says_slide = ask(&short, None, &candidates, &[(0.2, 500), (0.9, 500)]);
-        let says_hinge = ask(&short, None, &candidates, &[(0.9, 500), (0.2, 500)]);
+        let says_slide = ask(&short, None, &candidates, &[-4.0, 8.0]);
+        let says_hinge = ask(&short, None, &candidates, &[8.0, -4.0]);
         assert!(says_slide < 0.1 && says_hinge > 0.8);
     }
 

@@ -32,9 +32,8 @@ pub struct Question<'a> {
     pub grip: Point,
     /// All axes that the part could have.
     pub candidates: &'a [AxisCandidate],
-    /// For each candidate how well it explains the depth of the open state: the share of moved points seen in their place,
-    /// and how many there were (see [`crate::geometry::moved::agreement`]).
-    pub agreement: &'a [(f64, usize)],
+    /// For each candidate how well it explains the depth of the open state, in nats (see [`crate::geometry::sights::agreement`]).
+    pub agreement: &'a [f64],
     /// Width and height of the moving part and the grip's place in it (-0.5..0.5 to the right and up), where known.
     pub part: Option<PartShape>,
     /// The touched face, where one was found.

@@ -1,0 +1,224 @@
+//! What a joint says that every ray of an open view meets (ours).
+//!
+//! The leaf where the joint puts it, whatever lies behind the place that the leaf left, the rest of the front where it was. All
+//! joints are judged on the same rays against the same alternative, that nothing moved: a joint gains nothing by saying little,
+//! and loses by leaving unexplained what stands before the closed front.
+
+use nalgebra::Matrix3;
+
+use super::Face;
+use super::face::Rect;
+use super::moved::{GRAZING, Hold, View, tolerance};
+use crate::articulation::{Articulation, JointKind};
+use crate::math::{Point, Vector, rotation};
+
+/// Rays of a view that are looked at, at most.
+const RAYS: usize = 400;
+/// Rays that pass the part further away than this meet nothing of it, however it opens, metres beside its own size.
+const REACH_M: f64 = 0.6;
+/// A surface nearer to the eye than this is none, metres.
+const NEAREST_M: f64 = 0.15;
+/// Neighbouring rays and following views share their errors: all rays on a clip's part count as this many.
+const INDEPENDENT: f64 = 3.0;
+/// An outline is seldom exact, and not all of a part is seen to move.
+const ON_PART: f64 = 0.9;
+/// Of a front's extent so much is front.
+const FILLED: f64 = 0.95;
+/// Share of rays that something before what is expected hides: arms, hands, other doors.
+const BEFORE: f64 = 0.25;
+/// Share of rays that go on behind where a surface is expected.
+const BEHIND: f64 = 0.15;
+/// Share of rays that meet a surface where they are expected to go on.
+const BLOCKED: f64 = 0.1;
+/// Over this far behind a surface a depth may lie anywhere, metres: a kitchen's width.
+const ROOM_M: f64 = 4.0;
+
+/// A ray of a view.
+#[derive(Debug, Clone, Copy)]
+struct Ray {
+    /// Way per metre of depth, face coordinates (right, up, out).
+    way: Vector,
+    /// Depth seen, metres.
+    depth: f64,
+    /// Depth at which the ray meets the closed front; infinite where it does not.
+    front: f64,
+    /// Probability that the front is the part there.
+    part: f64,
+    /// Likelihood of the depth if nothing moved, 1/m.
+    still: f64,
+}
+
+/// The rays of one view.
+#[derive(Debug, Clone)]
+struct ViewRays {
+    hold: Hold,
+    /// The grip, world.
+    grip: Point,
+    /// The eye in face coordinates.
+    eye: Vector,
+    rays: Vec<Ray>,
+}
+
+/// A face's part, closed, and the rays of the open views near it: the same for every joint that it could have.
+#[derive(Debug, Clone)]
+pub(super) struct Rays {
+    face_from_world: Matrix3<f64>,
+    center: Point,
+    outline: Option<Rect>,
+    views: Vec<ViewRays>,
+    /// What a ray's log likelihood counts.
+    weight: f64,
+}
+
+/// Probability that the part reaches a point of its front: inside its outline, or near the grip where there is none.
+fn membership(outline: Option<&Rect>, right: f64, up: f64) -> f64 {
+    /// An outline is a few cells off: from inside to outside over this far, metres.
+    const RIM_M: f64 = 0.12;
+    /// A part reaches this far from its handle, in the mean of all directions of all sorts of fronts, metres.
+    const MEAN_REACH_M: f64 = 0.12;
+    ON_PART
+        * match outline {
+            Some(rect) => {
+                let within = |x: f64, b: [f64; 2]| (x - b[0]).min(b[1] - x);
+                let inside = within(right, rect.bounds[0]).min(within(up, rect.bounds[1]));
+                (0.5 + inside / RIM_M).clamp(0.0, 1.0)
+            }
+            None => (-right.hypot(up) / MEAN_REACH_M).exp(),
+        }
+}
+
+/// Likelihood (1/m) of a depth where a surface is expected.
+fn surface(depth: f64, expected: f64) -> f64 {
+    // A top as flat as the tolerance is wide; the integral of 1 / (1 + x^4) is pi over the root of two.
+    let x = (depth - expected) / tolerance(expected);
+    let area = std::f64::consts::PI / std::f64::consts::SQRT_2 * tolerance(expected);
+    let hit = (1.0 - BEFORE - BEHIND) / (area * (1.0 + x.powi(4)));
+    hit + if depth < expected { BEFORE / expected } else { BEHIND / ROOM_M }
+}
+
+/// Likelihood (1/m) of a depth where the view goes on behind the closed front at `front`.
+fn opened(depth: f64, front: f64) -> f64 {
+    /// What furniture is deep, metres; beyond it, half as likely.
+    const INSIDE_M: f64 = 1.0;
+    let free = (1.0 - BEFORE - BLOCKED) / INSIDE_M;
+    match depth - front {
+        d if d < -tolerance(front) => BEFORE / front,
+        d if d < tolerance(front) => BLOCKED / (2.0 * tolerance(front)),
+        d if d < INSIDE_M => free,
+        _ => 0.5 * free,
+    }
+}
+
+/// Likelihood (1/m) of a depth where the view passes a drawer's front at `leaf` and its closed place at `front`: between them,
+/// or some way behind, it meets the tray and what lies in it.
+fn tray(depth: f64, leaf: f64, front: f64) -> f64 {
+    /// What is seen of the tray's inside behind the closed front, metres.
+    const INSIDE_M: f64 = 0.3;
+    match depth {
+        d if d < leaf => BEFORE / leaf,
+        d if d < front + INSIDE_M => (1.0 - BEFORE - BLOCKED) / (front + INSIDE_M - leaf),
+        _ => BLOCKED / ROOM_M,
+    }
+}
+
+impl Rays {
+    /// The rays of `views` near the part that `outline` has on `face`, or near the grip where no outline is known.
+    pub(super) fn of(face: &Face, outline: Option<&Rect>, views: &[View]) -> Self {
+        /// Half of what a part without an outline may measure across, metres.
+        const UNKNOWN_M: f64 = 0.3;
+        let face_from_world = Matrix3::from_rows(&[face.right, face.up, face.normal].map(|axis| axis.transpose()));
+        let [right, up] = outline.map_or([0.0; 2], |r| r.bounds.map(|b| 0.5 * (b[0] + b[1])));
+        let middle = Vector::new(right, up, 0.0);
+        let reach = REACH_M + outline.map_or(UNKNOWN_M, |r| 0.5 * r.size()[0].hypot(r.size()[1]));
+        let within = |x: f64, b: [f64; 2]| (b[0]..=b[1]).contains(&x);
+        let views: Vec<ViewRays> = views
+            .iter()
+            .map(|view| {
+                let eye = face_from_world * (view.eye - face.center);
+                let to = middle - eye;
+                let mut near: Vec<(Vector, f64)> = Vec::new();
+                view.each_depth(|way, depth| {
+                    let way = face_from_world * way;
+                    let along = to.dot(&way) / way.norm_squared();
+                    if along > 0.0 && (way * along - to).norm() < reach {
+                        near.push((way, depth));
+                    }
+                });
+                let step = near.len().div_ceil(RAYS).max(1);
+                let rays = near
+                    .into_iter()
+                    .step_by(step)
+                    .map(|(way, depth)| {
+                        let front = -eye.z / way.z;
+                        if way.z.abs() < GRAZING * way.norm() || front < NEAREST_M {
+                            return Ray { way, depth, front: f64::INFINITY, part: 0.0, still: 1.0 / ROOM_M };
+                        }
+                        let at = eye + way * front;
+                        let part = membership(outline, at.x, at.y);
+                        // Of what lies beside the front nothing is known.
+                        let seen = within(at.x, face.extent[0]) && within(at.y, face.extent[1]);
+                        let filled = FILLED * if seen { 1.0 } else { part };
+                        let still = filled * surface(depth, front) + (1.0 - filled) * opened(depth, front);
+                        Ray { way, depth, front, part, still }
+                    })
+                    .collect();
+                ViewRays { hold: view.hold, grip: view.grip, eye, rays }
+            })
+            .collect();
+        let on_part: f64 = views.iter().flat_map(|v| &v.rays).map(|r| r.part).sum();
+        let weight = (INDEPENDENT / on_part.max(1.0)).min(1.0);
+        Self { face_from_world, center: face.center, outline: outline.copied(), views, weight }
+    }
+
+    /// Whether any view has this hold.
+    pub(super) fn has(&self, hold: Hold) -> bool {
+        self.views.iter().any(|v| v.hold == hold)
+    }
+
+    /// Log likelihood of the views of one sort under a joint, against that nothing moved, in nats. `offset` (rad or m) is
+    /// added to the opening that the hand tells.
+    pub(super) fn log_likelihood(&self, joint: &Articulation, grip: &Point, hold: Hold, offset: f64) -> f64 {
+        let axis = self.face_from_world * joint.axis;
+        let origin = self.face_from_world * (joint.origin - self.center);
+        let mut sum = 0.0;
+        for view in self.views.iter().filter(|v| v.hold == hold) {
+            let opening = joint.opening_at(grip, &view.grip) + offset;
+            // The leaf stays and the eye goes back instead, with its rays.
+            let (back, eye) = match joint.kind {
+                JointKind::Revolute => {
+                    let back = rotation(&axis, -opening).to_rotation_matrix().into_inner();
+                    (back, back * (view.eye - origin) + origin)
+                }
+                JointKind::Prismatic => (Matrix3::identity(), view.eye - axis * opening),
+            };
+            let drawer = joint.kind == JointKind::Prismatic && axis.z > 0.9 && opening > 0.0;
+            for ray in &view.rays {
+                let way = back * ray.way;
+                let leaf = -eye.z / way.z;
+                let on_leaf = if leaf > NEAREST_M && way.z.abs() > GRAZING * way.norm() {
+                    membership(self.outline.as_ref(), eye.x + way.x * leaf, eye.y + way.y * leaf)
+                } else {
+                    0.0
+                };
+                if on_leaf <= 0.0 && ray.part <= 0.0 {
+                    continue;
+                }
+                let left = match ray.part {
+                    0.0 => 0.0,
+                    part if drawer && leaf > 0.0 && leaf < ray.front => part * tray(ray.depth, leaf, ray.front),
+                    part => part * opened(ray.depth, ray.front),
+                };
+                let stays = (1.0 - ray.part) * ray.still;
+                let met = if on_leaf > 0.0 { on_leaf * surface(ray.depth, leaf) } else { 0.0 };
+                // Behind the front a leaf is seen through its own hole.
+                let likelihood = if leaf <= ray.front + 1e-9 {
+                    met + (1.0 - on_leaf) * (left + stays)
+                } else {
+                    stays + ray.part * met + (1.0 - on_leaf) * left
+                };
+                sum += (likelihood / ray.still).ln();
+            }
+        }
+        sum * self.weight
+    }
+}

@@ -1,0 +1,276 @@
+//! How well a joint explains what is seen of the part while it is open (ours).
+//!
+//! Two readings of the same depth. The part's points: of those that the joint moves clearly, how many are seen where it puts
+//! them and no longer where they were. And the views' rays ([`super::rays`]): of all that is seen there, how much better the
+//! joint explains it than that nothing moved. Points are robust, but a joint that hardly moves any escapes them; rays ask
+//! every joint the same, but need the outline more. They share the depth's errors and are pooled as opinions are, by weighted
+//! sums of their logarithms.
+
+use std::cmp::Ordering;
+
+use super::Face;
+use super::face::Rect;
+use super::moved::{Hold, MIN_POINTS, View, tolerance};
+use super::rays::Rays;
+use crate::articulation::Articulation;
+use crate::math::Point;
+
+/// What the two readings count in the pool: of (1, 0), (0.75, 0.5) and (0.5, 1) the pair that explains the development seeds of
+/// four tiers best.
+const POINTS_WEIGHT: f64 = 0.75;
+const RAYS_WEIGHT: f64 = 0.5;
+/// Rays may not outvote a hand by more than this, nats: where an outline is wrong they are all wrong together.
+const MOST_NATS: f64 = 10.0;
+/// Between two offsets, metres: what the depth's tolerance bridges.
+const STEP_M: f64 = 0.02;
+
+/// How well a joint explains the open views, in nats against that nothing moved.
+///
+/// Hands and depth disagree by a few centimetres that stay the same over a clip (a hand's distance is the least certain thing
+/// about it): the opening that the hand tells has an offset of its own, of which `grip_std_m` is the spread along the motion,
+/// metres.
+#[must_use]
+pub fn agreement(sights: &Sights, joint: &Articulation, grip: &Point, grip_std_m: f64) -> f64 {
+    POINTS_WEIGHT * log_likelihood(by_points(sights, joint, grip, grip_std_m))
+        + RAYS_WEIGHT * by_rays(&sights.rays, joint, grip, grip_std_m)
+}
+
+/// The rays' word: all offsets count, each as far as it is believed in.
+fn by_rays(rays: &Rays, joint: &Articulation, grip: &Point, grip_std_m: f64) -> f64 {
+    /// Offsets to each side, in standard deviations and at the most in number.
+    const REACH: f64 = 2.5;
+    const STEPS: f64 = 5.0;
+    let lever = joint.lever(grip).max(0.05);
+    // Where a hand was lost before it let go, the views after that have an offset of their own.
+    let of = |hold: Hold| -> f64 {
+        let std_m = hold.std_m(grip_std_m);
+        let step = STEP_M.max(REACH * std_m / STEPS);
+        let reach = (REACH * std_m / step).round() as i32;
+        let terms: Vec<(f64, f64)> = (-reach..=reach)
+            .map(|k| {
+                let offset = f64::from(k) * step;
+                let prior = (-0.5 * (offset / std_m).powi(2)).exp();
+                (prior, rays.log_likelihood(joint, grip, hold, offset / lever))
+            })
+            .collect();
+        let top = terms.iter().map(|(_, l)| *l).fold(f64::NEG_INFINITY, f64::max);
+        let believed: f64 = terms.iter().map(|(prior, _)| prior).sum();
+        top + (terms.iter().map(|(prior, l)| prior * (l - top).exp()).sum::<f64>() / believed).ln()
+    };
+    let total: f64 = Hold::ALL.into_iter().filter(|h| rays.has(*h)).map(of).sum();
+    MOST_NATS * (total / MOST_NATS).tanh()
+}
+
+/// The points' word: of the face's points that a joint moves clearly, the share that is seen where it puts them rather than seen
+/// through there, and no longer where they were; and the number of such sights.
+///
+/// Hands and depth disagree by a few centimetres that stay the same over a clip (a hand's distance is the least certain thing
+/// about it): the opening that the hand tells is taken with an offset of its own, the one that explains most, less what so
+/// large an offset is believed in. `grip_std_m` is the spread of the offsets, metres.
+fn by_points(sights: &Sights, joint: &Articulation, grip: &Point, grip_std_m: f64) -> (f64, usize) {
+    /// Half a squared standard deviation against the log likelihood that the whole share is worth to the reasoner.
+    const SHARE_PER_NAT: f64 = 1.0 / 18.0;
+    let lever = joint.lever(grip).max(0.05);
+    // Where a hand was lost before it let go, the views after that have an offset of their own.
+    let of = |hold: Hold| -> (f64, usize) {
+        let std_m = hold.std_m(grip_std_m);
+        let at = |offset: f64| -> (f64, usize) {
+            let (share, count) = seen_share(sights, joint, grip, hold, offset / lever);
+            ((share - SHARE_PER_NAT * 0.5 * (offset / std_m).powi(2)).max(0.0), count)
+        };
+        // An offset under which nothing moves clearly explains nothing; of equal offsets the first is kept.
+        let better = |best: (f64, (f64, usize)), offset: f64| -> (f64, (f64, usize)) {
+            let found = at(offset);
+            let order = (found.1 >= MIN_POINTS, found.0).partial_cmp(&(best.1.1 >= MIN_POINTS, best.1.0));
+            if order == Some(Ordering::Greater) { (offset, found) } else { best }
+        };
+        // Two standard deviations to each side, from the middle outwards: far reaches by double steps first.
+        let stride = if std_m > 2.0 * STEP_M { 2.0 * STEP_M } else { STEP_M };
+        let reach = (2.0 * std_m / stride).round() as i32;
+        let mut best = (0.0, at(0.0));
+        for k in 1..=reach {
+            best = better(better(best, -f64::from(k) * stride), f64::from(k) * stride);
+        }
+        if stride > STEP_M {
+            let middle = best.0;
+            best = better(better(best, middle - STEP_M), middle + STEP_M);
+        }
+        best.1
+    };
+    let (mut explained, mut count) = (0.0, 0);
+    for hold in Hold::ALL.into_iter().filter(|h| sights.views.iter().any(|v| v.hold == *h)) {
+        let (share, points) = of(hold);
+        explained += share * points as f64;
+        count += points;
+    }
+    (explained / count.max(1) as f64, count)
+}
+
+/// What [`by_points`] is worth, in nats: of the points that a right joint moves about four fifths are seen in their place, of
+/// a wrong one's about a third by chance. Neighbouring points share their fate, so all of them count as a few.
+pub(super) fn log_likelihood((share, count): (f64, usize)) -> f64 {
+    const RIGHT: f64 = 0.8;
+    const WRONG: f64 = 0.3;
+    const INDEPENDENT: f64 = 8.0;
+    // With few points the share is noise; with none it says nothing.
+    let weight = INDEPENDENT * (count as f64 / 200.0).min(1.0);
+    weight * (share * (RIGHT / WRONG).ln() + (1.0 - share) * ((1.0 - RIGHT) / (1.0 - WRONG)).ln())
+}
+
+/// Points of a face's part, closed, and what the open views see there: the same for every joint that it could have.
+#[derive(Debug, Clone)]
+pub struct Sights<'a> {
+    rays: Rays,
+    face: &'a Face,
+    bounds: [[f64; 2]; 2],
+    views: &'a [View<'a>],
+    points: Vec<Point>,
+    /// For each view and point [`View::gap`].
+    closed: Vec<Vec<Option<(f64, f64)>>>,
+}
+
+impl<'a> Sights<'a> {
+    /// A grid over the part, or over a piece of its face around the grip where the part is not known.
+    #[must_use]
+    pub fn of(face: &'a Face, rect: Option<&Rect>, views: &'a [View<'a>]) -> Self {
+        // What the smallest front has.
+        const HALF_M: f64 = 0.12;
+        const STEPS: usize = 12;
+        let bounds = rect.map_or([[-HALF_M, HALF_M]; 2], |r| r.bounds);
+        let at = |k: usize, b: [f64; 2]| b[0] + (b[1] - b[0]) * (k as f64 + 0.5) / STEPS as f64;
+        let points: Vec<Point> =
+            (0..STEPS * STEPS).map(|i| face.point(at(i % STEPS, bounds[0]), at(i / STEPS, bounds[1]), 0.0)).collect();
+        let closed = views.iter().map(|view| points.iter().map(|p| view.gap(p)).collect()).collect();
+        Self { rays: Rays::of(face, rect, views), face, bounds, views, points, closed }
+    }
+}
+
+/// The share of [`by_points`] in the views of one sort, with `offset` (rad or m) added to the opening that the hand tells.
+pub(super) fn seen_share(sights: &Sights, joint: &Articulation, grip: &Point, hold: Hold, offset: f64) -> (f64, usize) {
+    let Sights { face, bounds, .. } = sights;
+    let (mut explained, mut count) = (0usize, 0usize);
+    for (view, closed) in sights.views.iter().zip(&sights.closed).filter(|(v, _)| v.hold == hold) {
+        let motion = joint.motion(joint.opening_at(grip, &view.grip) + offset);
+        let back = motion.inverse();
+        for (here, closed) in sights.points.iter().zip(closed) {
+            let moved = motion * here;
+            let travel = (moved - here).norm();
+            // Less than twice the least tolerance is no motion anywhere.
+            if travel < 2.0 * tolerance(0.0) {
+                continue;
+            }
+            // Where it goes. Within the face there is a surface whether the part slid there or not.
+            if let Some((gap, z)) = view.gap(&moved)
+                && travel >= 2.0 * tolerance(z)
+                && gap >= -tolerance(z)
+                && face.coordinates(&moved)[2].abs() > tolerance(z)
+            {
+                count += 1;
+                explained += usize::from(gap <= tolerance(z));
+            }
+            // Where it was, unless another piece of it is there now.
+            if let Some((gap, z)) = *closed
+                && travel >= 2.0 * tolerance(z)
+                && gap >= -tolerance(z)
+            {
+                let [right, up, out] = face.coordinates(&(back * here));
+                let within = |x: f64, b: [f64; 2]| (b[0]..=b[1]).contains(&x);
+                let covered = out.abs() <= tolerance(z) && within(right, bounds[0]) && within(up, bounds[1]);
+                if !covered {
+                    count += 1;
+                    explained += usize::from(gap > tolerance(z));
+                }
+            }
+        }
+    }
+    (explained as f64 / count.max(1) as f64, count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::moved::drawn;
+    use super::*;
+    use crate::articulation::JointKind;
+    use crate::math::Vector;
+
+    const GRIP_STD_M: f64 = 0.03;
+
+    fn door() -> Articulation {
+        let origin = Point::new(-0.25, 0.0, 0.0);
+        Articulation { kind: JointKind::Revolute, axis: -Vector::z(), origin }
+    }
+
+    fn slide(axis: Vector) -> Articulation {
+        Articulation { kind: JointKind::Prismatic, axis, origin: door().origin }
+    }
+
+    /// The part moves by `opening`, the hand by `told`: what `of` makes of it.
+    fn ask<T>(
+        moves: &Articulation,
+        opening: f64,
+        told: f64,
+        rect: Option<&Rect>,
+        of: impl Fn(&Sights, &Point) -> T,
+    ) -> T {
+        let poses = [drawn::pose(Point::new(0.3, -1.0, 0.5)), drawn::pose(Point::new(0.1, -1.1, 0.4))];
+        let (face, grip) = (drawn::face(), drawn::face().center);
+        let sketches = poses.map(|pose| drawn::sketch(&pose, moves, opening));
+        let hand = moves.motion(told) * grip;
+        let views: Vec<View> = sketches.iter().zip(&poses).map(|(s, pose)| drawn::view(s, pose, hand)).collect();
+        of(&Sights::of(&face, rect, &views), &grip)
+    }
+
+    #[test]
+    fn a_joint_explains_its_own_motion_and_a_slide_within_the_face_must_uncover_something() {
+        let (out, aside) = (slide(-Vector::y()), slide(-Vector::x()));
+        let share = |moves: &Articulation, opening: f64, told: f64, claims: &Articulation| {
+            ask(moves, opening, told, Some(&drawn::rect()), |s, grip| by_points(s, claims, grip, GRIP_STD_M))
+        };
+        // Whoever claims the motion that was made explains nearly all.
+        for (joint, opening) in [(door(), 0.9), (out, 0.3), (aside, 0.3)] {
+            let (own, count) = share(&joint, opening, opening, &joint);
+            assert!(own > 0.9 && count > MIN_POINTS, "{joint:?} {own} {count}");
+        }
+        let (as_slide, _) = share(&door(), 0.9, 0.9, &out);
+        assert!(as_slide < 0.7, "{as_slide}");
+        // A front that stayed shut has the surface of a slide's other end, and uncovered nothing.
+        let (still, count) = share(&aside, 0.0, 0.3, &aside);
+        assert!(still < 0.1 && count > MIN_POINTS, "{still} {count}");
+    }
+
+    #[test]
+    fn rays_prefer_the_motion_that_was_made_with_and_without_an_outline() {
+        let joints = [(door(), 0.9), (slide(-Vector::y()), 0.3), (slide(-Vector::x()), 0.3)];
+        let rect = drawn::rect();
+        for outline in [Some(&rect), None] {
+            for (moves, opening) in &joints {
+                let found = joints.map(|(claims, _)| {
+                    ask(moves, *opening, *opening, outline, |s, grip| by_rays(&s.rays, &claims, grip, GRIP_STD_M))
+                });
+                let best = (0..3).max_by(|&a, &b| found[a].total_cmp(&found[b])).unwrap();
+                assert!(joints[best].0 == *moves && found[best] > 1.0, "{outline:?} {moves:?} {found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn rays_tell_a_short_pull_from_a_slide_that_stays_in_the_front() {
+        // Seven centimetres are less than depth at a metre needs to call a point moved.
+        let (out, aside) = (slide(-Vector::y()), slide(-Vector::x()));
+        let of =
+            |claims: &Articulation| ask(&out, 0.07, 0.07, None, |s, grip| by_rays(&s.rays, claims, grip, GRIP_STD_M));
+        assert!(of(&out) > of(&aside) + 1.0, "{} {}", of(&out), of(&aside));
+    }
+
+    #[test]
+    fn a_front_that_stayed_shut_speaks_against_all_motions() {
+        for joint in [door(), slide(-Vector::y()), slide(-Vector::x())] {
+            let told = if joint.kind == JointKind::Revolute { 0.9 } else { 0.3 };
+            let found =
+                ask(&joint, 0.0, told, Some(&drawn::rect()), |s, grip| by_rays(&s.rays, &joint, grip, GRIP_STD_M));
+            // Most of what a slide within the front covers is covered by the front that stayed.
+            let leaves = joint.axis.x.abs() < 0.5;
+            assert!(found < if leaves { -1.0 } else { 0.0 }, "{joint:?} {found}");
+        }
+    }
+}
