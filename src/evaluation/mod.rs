@@ -2,6 +2,7 @@
 
 pub mod bootstrap;
 pub mod calibration;
+pub mod coverage;
 pub mod deviations;
 pub mod discrimination;
 pub mod failures;

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::truth::{Prediction, TrueClip};
 use crate::articulation::JointKind;
+use crate::inference::uncertainty::sigmas;
 use crate::math::line::Line;
 use crate::math::{Vector, signed_angle, unsigned_angle};
 use crate::twin::OrientedBox;
@@ -54,6 +55,13 @@ pub struct Measured {
     pub box_iou: Option<f64>,
     /// Largest offset of the six faces of the predicted part's box, closed, along the true box's axes, metres.
     pub box_edge_m: Option<f64>,
+    /// Angle between the axes regardless of sign, in the standard deviations that the prediction gives along it; none where
+    /// it gives none and where the types differ, here and in the next two.
+    pub axis_sigmas: Option<f64>,
+    /// Distance of the true origin from the predicted hinge in the same way; none for slides.
+    pub origin_sigmas: Option<f64>,
+    /// Difference between the ranges moved in the same way.
+    pub range_sigmas: Option<f64>,
 }
 
 /// Compares a prediction with the truth; `None` where there is no answer.
@@ -67,6 +75,7 @@ pub fn measure(prediction: &Prediction, truth: &TrueClip) -> Option<Measured> {
     let type_right = kind == truth.kind;
     let range = prediction.range.filter(|_| type_right);
     let turns = type_right && kind == JointKind::Revolute;
+    let said = prediction.uncertainty.as_ref().filter(|_| type_right);
     Some(Measured {
         type_right,
         kind: truth.kind,
@@ -100,7 +109,24 @@ pub fn measure(prediction: &Prediction, truth: &TrueClip) -> Option<Measured> {
             let [low, high] = extent(&truth.part_box, b);
             (low + truth.part_box.half).amax().max((high - truth.part_box.half).amax())
         }),
+        axis_sigmas: said.and_then(|u| {
+            let turn = turn_onto(&axis, &truth.axis);
+            sigmas(&u.axis_cov_rad2, u.across.map(|direction| direction.dot(&turn)))
+        }),
+        origin_sigmas: said.filter(|_| turns).and_then(|u| {
+            let offset = truth.origin - origin?;
+            sigmas(u.origin_cov_m2.as_ref()?, u.across.map(|direction| direction.dot(&offset)))
+        }),
+        range_sigmas: range.zip(prediction.range_std).map(|(r, std)| (r - truth.moved).abs() / std),
     })
+}
+
+/// The turn that brings one unit axis onto the line of another: a rotation vector, radians.
+fn turn_onto(from: &Vector, to: &Vector) -> Vector {
+    let to = if from.dot(to) < 0.0 { -to } else { *to };
+    let about = from.cross(&to);
+    let sine = about.norm();
+    if sine > 0.0 { about * (sine.atan2(from.dot(&to)) / sine) } else { about }
 }
 
 /// Distance between two infinite lines, metres; of `b`'s point from `a` where they are parallel: where the sine of their

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::bootstrap::{Cluster, Interval, interval};
 use super::calibration::{Answered, Calibration, calibration, precision_at};
+use super::coverage::{Coverage, coverage};
 use super::deviations::{Deviations, MeanErrors, Pairs, deviations, mean_errors, pairs};
 use super::failures::{Failure, FailureCount};
 use super::rules::{Measured, Rule, measure, usdnet_mo};
@@ -196,6 +197,8 @@ pub struct Report {
     pub groups: Vec<Group>,
     /// What the confidences are worth.
     pub confidences: Confidences,
+    /// What the covariances are worth; one entry for each kind of error that some prediction speaks of.
+    pub coverage: Vec<Coverage>,
     /// Whether clips of one joint were recognised as such.
     pub pairs: Option<Pairs>,
     /// What became of the clips; ends that no clip came to are left out.
@@ -248,6 +251,7 @@ pub fn evaluate(predictions: &Predictions, truths: &[Truth]) -> Report {
         deviations: deviations(&per_clip),
         groups: groups(&per_clip),
         confidences: confidences(&per_clip),
+        coverage: coverage(&per_clip),
         pairs: pairs(&per_clip),
         failures: failures(&per_clip),
         per_clip,

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::articulation::{Action, JointKind};
 use crate::error::{Error, Result};
+use crate::inference::Uncertainty;
 use crate::json;
 use crate::math::{Point, Vector, unit};
 use crate::twin::OrientedBox;
@@ -52,6 +53,12 @@ pub struct Prediction {
     /// Opening that the clip went through, rad or m.
     #[serde(default)]
     pub range: Option<f64>,
+    /// Standard deviation of `range`, rad or m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub range_std: Option<f64>,
+    /// How sure axis and hinge are, and the largest opening of the joint; of the clip's own opening `range_std` tells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<Uncertainty>,
     /// Box of the moving part, closed.
     #[serde(default)]
     pub part_box: Option<OrientedBox>,
@@ -94,6 +101,9 @@ impl Predictions {
                     return Err(Error::format(path, place, format!("{name} must be a probability, from 0 to 1")));
                 }
             }
+            if p.range_std.is_some_and(|std| !std.is_finite() || std <= 0.0) {
+                return Err(Error::format(path, place, "range_std must be finite and positive"));
+            }
             if p.kind.is_none() {
                 continue;
             }
@@ -101,6 +111,9 @@ impl Predictions {
                 Error::format(path, place.clone(), "a prediction with a type needs a finite axis that is not zero")
             })?;
             p.axis = Some(axis);
+            if let Some(Err(fault)) = p.uncertainty.as_ref().map(|u| u.check(&axis)) {
+                return Err(Error::format(path, place, format!("uncertainty: {fault}")));
+            }
             if p.origin.is_some_and(|o| o.coords.iter().any(|x| !x.is_finite())) {
                 return Err(Error::format(path, place, "the origin is not finite"));
             }
@@ -302,5 +315,27 @@ mod tests {
         assert!(error.contains("r/c") && error.contains("joint_confidence"), "{error}");
         std::fs::write(&path, row.replace("\"joint_confidence\": 1.2", "\"stage\": \"localization\"")).unwrap();
         assert_eq!(Predictions::read(&path).unwrap().predictions[0].stage, Some(Stage::Localization));
+    }
+
+    #[test]
+    fn what_is_said_about_errors_can_be_worked_with() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("p.json");
+        let row = r#"{"predictions": [{"recording": "r", "clip": "c", "type": "revolute", "axis": [0, 0, 2],
+            "range_std": 0.1, "uncertainty": {"across": [[1, 0, 0], [0, 1, 0]], "axis_cov_rad2": [[1e-3, 0], [0, 1e-3]],
+            "observed_range_std": 0.1}}]}"#;
+        std::fs::write(&path, row).unwrap();
+        let read = Predictions::read(&path).unwrap();
+        assert_eq!(read.predictions[0].uncertainty.as_ref().unwrap().origin_cov_m2, None);
+        for (good, bad, word) in [
+            ("\"range_std\": 0.1, \"u", "\"range_std\": 0, \"u", "range_std"),
+            ("[0, 1, 0]]", "[0, 0, 1]]", "across"),
+            ("[0, 1e-3]]", "[0, -1e-3]]", "axis_cov_rad2"),
+        ] {
+            assert!(row.contains(good));
+            std::fs::write(&path, row.replace(good, bad)).unwrap();
+            let error = Predictions::read(&path).unwrap_err().to_string();
+            assert!(error.contains("r/c") && error.contains(word), "{error}");
+        }
     }
 }

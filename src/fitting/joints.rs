@@ -350,6 +350,7 @@ fn found(entry: &Entry, frame: &Frame, config: &config::Fitting) -> Result<Found
         part: Some(rect),
         joint_probability: 1.0,
         hinge_std_m: None,
+        uncertainty: None,
         moved: Vec::new(),
         observed_range: upper,
     };

@@ -458,6 +458,7 @@ mod tests {
             type_probability: 1.0,
             joint_probability: 1.0,
             hinge_std_m: None,
+            uncertainty: None,
             grip: Point::new(0.2, -0.035, 0.8),
             face: Some(face),
             part: Some(Rect { bounds: [[-0.5, 0.06], [-0.3, 0.1]] }),

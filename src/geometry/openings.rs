@@ -42,6 +42,10 @@ pub struct Refit {
     pub joint: Articulation,
     /// One entry a view of each clip, in the order given.
     pub openings: Vec<Vec<Opening>>,
+    /// Two directions across the axis, world, unit: out of the front, and along it.
+    pub across: [Vector; 2],
+    /// Covariance of the hinge along `across`, m^2, by rows; none for slides.
+    pub hinge_cov_m2: Option<[[f64; 2]; 2]>,
     /// Standard deviation of the hinge across its axis in its least sure direction, metres; 0 for slides.
     pub position_std_m: f64,
 }
@@ -142,6 +146,8 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
         return None;
     }
     let hinge = covariance.view((0, 0), (2, 2)).into_owned();
+    let rows: [[f64; 2]; 2] = std::array::from_fn(|row| std::array::from_fn(|column| hinge[(row, column)]));
+    let hinge_cov_m2 = (joint.kind == JointKind::Revolute).then_some(rows);
     let position_std_m = match joint.kind {
         JointKind::Prismatic => 0.0,
         JointKind::Revolute => hinge.symmetric_eigen().eigenvalues.max().max(0.0).sqrt(),
@@ -163,7 +169,8 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
                 .collect()
         })
         .collect();
-    Some(Refit { joint: shifted(joint, &e1, &e2, shift), openings, position_std_m })
+    let joint = shifted(joint, &e1, &e2, shift);
+    Some(Refit { joint, openings, across: [e1, e2], hinge_cov_m2, position_std_m })
 }
 
 /// Directions across a hinge: out of the front, and along it.
@@ -366,6 +373,11 @@ mod tests {
         let off = door().line().distance(&fit.joint.origin);
         assert!(off < 0.012, "{off}");
         assert!(fit.position_std_m < NOISE.hinge_m);
+        // The largest variance of the covariance is the standard deviation's; depth narrows both directions.
+        let [[out, mixed], [_, along]] = fit.hinge_cov_m2.unwrap();
+        let largest = 0.5 * (out + along) + (0.25 * (out - along).powi(2) + mixed * mixed).sqrt();
+        assert!((largest.sqrt() - fit.position_std_m).abs() < 1e-9 && out < PLANE_STD_M.powi(2), "{fit:?}");
+        assert!((fit.across[0] + Vector::y()).norm() < 1e-9 && fit.across[1].z.abs() < 1e-9, "{fit:?}");
     }
 
     #[test]
@@ -374,7 +386,7 @@ mod tests {
         let fit = fitted(&drawer, 0.3, &drawer, 0.36, Point::new(0.2, -1.3, 0.5)).unwrap();
         let found = fit.openings[0][0];
         assert!((found.value - 0.3).abs() < 0.01 && found.informed, "{found:?}");
-        assert_eq!((fit.joint, fit.position_std_m), (drawer, 0.0));
+        assert_eq!((fit.joint, fit.position_std_m, fit.hinge_cov_m2), (drawer, 0.0, None));
     }
 
     #[test]

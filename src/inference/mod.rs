@@ -3,6 +3,7 @@
 pub mod aggregate;
 pub mod bare;
 pub mod paper;
+pub mod uncertainty;
 
 use serde::{Deserialize, Serialize};
 
@@ -13,6 +14,7 @@ use crate::geometry::{AxisCandidate, AxisSource, Face};
 use crate::hands::Trajectory;
 use crate::math::{Point, Vector, path, stats};
 use crate::reasoning::Answer;
+pub use uncertainty::Uncertainty;
 
 /// The joint of one clip, with what speaks for it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -17,7 +17,7 @@ use crate::geometry::Rect;
 use crate::geometry::segments::{LiftedSegment, LineDetector, lift};
 use crate::geometry::{AxisCandidate, Face, LineTrack, ManhattanFrame, depth_scale, manhattan, tracks};
 use crate::hands::Trajectory;
-use crate::inference::ClipJoint;
+use crate::inference::{ClipJoint, Uncertainty};
 use crate::localization::{Region, views};
 use crate::math::Point;
 use crate::reasoning::words::Words;
@@ -69,8 +69,12 @@ pub struct SceneJoint {
     pub type_probability: f64,
     /// Probability of type and axis.
     pub joint_probability: f64,
-    /// Standard deviation of a hinge across its axis, metres; `None` for slides and where the open state was not seen.
+    /// Standard deviation of a hinge across its axis in its least sure direction, metres; `None` for slides and where the
+    /// open state was not seen.
     pub hinge_std_m: Option<f64>,
+    /// How sure axis, hinge and openings are; `None` for joints that nobody was seen to move.
+    #[serde(default)]
+    pub uncertainty: Option<Uncertainty>,
     /// The grip when closed, world.
     pub grip: Point,
     /// The touched face.

@@ -9,6 +9,7 @@ use crate::geometry::moved::{self, Hold};
 use crate::geometry::openings::{self, OpenState, Opening};
 use crate::geometry::{Face, Rect};
 use crate::hands::{self, Trajectory};
+use crate::inference::uncertainty::OpenStates;
 use crate::recording::Recording;
 use crate::recording::sketch::Sketch;
 
@@ -21,6 +22,8 @@ pub(super) struct Refitted<'a> {
     pub(super) position_std_m: f64,
     /// Opening that each clip went through, rad or m.
     pub(super) ranges: Vec<f64>,
+    /// How sure hinge and ranges are.
+    pub(super) depth: OpenStates,
 }
 
 /// The hinge and the openings that the depth of the open states tells. `None` where they were not seen.
@@ -53,10 +56,16 @@ pub(super) fn refitted<'a>(
         .zip(&fit.openings)
         .map(|(((_, t), state), seen)| open_end(&fit.joint, t, state, seen))
         .collect();
-    let ranges = left_where_found(shown, &ends).into_iter().map(|end| end.max(0.0)).collect();
+    let ends = left_where_found(shown, &ends);
+    let ranges = ends.iter().map(|end| end.value.max(0.0)).collect();
+    let depth = OpenStates {
+        across: fit.across,
+        hinge_cov_m2: fit.hinge_cov_m2,
+        moved_std: ends.iter().map(|end| end.std).collect(),
+    };
     let openings = fit.openings.iter().flatten().map(|o| o.value).collect();
     let views = views.into_iter().flatten().collect();
-    Some(Refitted { joint: fit.joint, views, openings, position_std_m: fit.position_std_m, ranges })
+    Some(Refitted { joint: fit.joint, views, openings, position_std_m: fit.position_std_m, ranges, depth })
 }
 
 /// Opening at the open end of a clip. After the hand let go the part stands there: what those views show counts, else what is
@@ -89,20 +98,71 @@ fn open_end(joint: &Articulation, trajectory: &Trajectory, state: &OpenState, se
 }
 
 /// A part stays where it was left: the open end of a clip is where the next clip of the part finds it. Both clips' values
-/// become their weighted mean.
-fn left_where_found(shown: &[(&ClipResult, &Trajectory)], ends: &[Opening]) -> Vec<f64> {
+/// become their weighted mean, which is surer than either: each clip has a hand's and a depth's error of its own.
+fn left_where_found(shown: &[(&ClipResult, &Trajectory)], ends: &[Opening]) -> Vec<Opening> {
     let mut order: Vec<usize> = (0..shown.len()).collect();
     order.sort_by_key(|&i| (shown[i].0.clip.start_frame, i));
-    let mut out: Vec<f64> = ends.iter().map(|e| e.value).collect();
+    let mut out = ends.to_vec();
     for pair in order.windows(2) {
         let (a, b) = (pair[0], pair[1]);
         if shown[a].1.action == Action::Open && shown[b].1.action == Action::Close {
             let [wa, wb] = [a, b].map(|i| ends[i].std.powi(-2));
             if (wa + wb).is_finite() && wa + wb > 0.0 {
-                let mean = (wa * ends[a].value + wb * ends[b].value) / (wa + wb);
-                (out[a], out[b]) = (mean, mean);
+                let value = (wa * ends[a].value + wb * ends[b].value) / (wa + wb);
+                let std = (wa + wb).sqrt().recip();
+                for i in [a, b] {
+                    out[i] = Opening { value, std, ..ends[i] };
+                }
             }
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::articulation::Outcome;
+    use crate::hands::Sample;
+    use crate::math::Point;
+    use crate::recording::Clip;
+
+    fn clip(start_frame: usize) -> ClipResult {
+        let [clip, narration, verb, noun] = [(); 4].map(|()| String::new());
+        ClipResult {
+            clip: Clip { clip, start_frame, end_frame: start_frame + 9, narration, verb, noun },
+            trajectory: None,
+            region: None,
+            views: Vec::new(),
+            lines: Vec::new(),
+            face: None,
+            part: None,
+            words: None,
+            candidates: Vec::new(),
+            answer: None,
+            joint: Outcome::Abstained(String::new()),
+        }
+    }
+
+    fn hand(action: Action) -> Trajectory {
+        let at = Point::origin();
+        let sample = Sample { frame: 0, time_secs: 0.0, observed: at, smoothed: at, accepted: true };
+        Trajectory { side: None, samples: vec![sample], action, ends_seen: [true; 2] }
+    }
+
+    #[test]
+    fn a_part_that_is_found_where_it_was_left_is_known_better_than_by_either_clip() {
+        // In the order of time: opened, closed, closed once more.
+        let (clips, hands) = ([20, 10, 30].map(clip), [Action::Close, Action::Open, Action::Close].map(hand));
+        let shown: Vec<(&ClipResult, &Trajectory)> = clips.iter().zip(&hands).collect();
+        let ends = [(1.1, 0.04), (1.0, 0.03), (0.5, 0.05)].map(|(value, std)| Opening { value, std, informed: true });
+        let found = left_where_found(&shown, &ends);
+        // Variances of 16 and 9 to one of 144 / 25.
+        assert!((found[0].std - 0.024).abs() < 1e-12 && (found[0].value - 1.036).abs() < 1e-12, "{found:?}");
+        assert_eq!((found[0], found[2]), (found[1], ends[2]));
+        // A clip without a view takes over what the other one saw.
+        let unseen = [Opening { std: f64::INFINITY, ..ends[0] }, ends[1], ends[2]];
+        let found = left_where_found(&shown, &unseen);
+        assert!((found[0].std - 0.03).abs() < 1e-12 && (found[0].value - 1.0).abs() < 1e-12, "{found:?}");
+    }
 }

@@ -13,7 +13,7 @@ use crate::geometry::Rect;
 use crate::geometry::sights::{self, Sights};
 use crate::geometry::{AxisCandidate, Face, candidates, moved, outline};
 use crate::hands::{self, Trajectory};
-use crate::inference::{self, aggregate};
+use crate::inference::{self, aggregate, uncertainty};
 use crate::math::Point;
 use crate::reasoning::{Answer, Question, Reasoner};
 use crate::recording::Recording;
@@ -115,6 +115,7 @@ fn merge_group(
     let face = clips[best].face;
     let (mut joint, mut type_probability) = (best_joint.joint, best_joint.type_probability);
     let mut joint_probability = best_joint.joint_probability;
+    let mut chosen = uncertainty::chosen(best_joint, &clips[best].candidates);
     if group.len() > 1 && config.inference.method == InferenceMethod::Paper {
         // The clips' own joints, one voice each.
         let all: Vec<(Articulation, f64)> =
@@ -182,6 +183,7 @@ fn merge_group(
             let all: Vec<(Articulation, f64)> =
                 pooled.iter().zip(&weights).map(|(k, w)| (k.joint, (w - weights[top]).exp())).collect();
             joint = aggregate::consensus(&pooled[top].joint, &all);
+            chosen = pooled[top].clone();
             let raw = revolute_probability.max(1.0 - revolute_probability);
             let temperature = config.inference.temperature;
             type_probability = inference::tempered(raw, temperature);
@@ -194,6 +196,7 @@ fn merge_group(
     let shown: Vec<(&ClipResult, &Trajectory)> =
         group.iter().filter_map(|&c| Some((&clips[c], clips[c].trajectory.as_ref()?))).collect();
     let mut hinge_std_m = None;
+    let mut depth = None;
     let mut part = clips[best].part;
     let mut moved: Vec<f64> =
         shown.iter().map(|(_, t)| inference::observed_range(&joint, &t.closed_grip(), &t.positions())).collect();
@@ -204,6 +207,7 @@ fn merge_group(
         joint = fit.joint;
         hinge_std_m = (joint.kind == JointKind::Revolute).then_some(fit.position_std_m);
         moved = fit.ranges;
+        depth = Some(fit.depth);
         // With the openings known better the part's outline is, too.
         if let Some(region) = &clips[best].region {
             let reach = config.localization.reach_m;
@@ -214,6 +218,16 @@ fn merge_group(
         }
     }
     let observed_range = moved.iter().copied().fold(0.0, f64::max);
+    let evidence = uncertainty::Evidence {
+        joint: &joint,
+        chosen: &chosen,
+        face: face.as_ref(),
+        hands: &shown.iter().map(|(_, t)| *t).collect::<Vec<_>>(),
+        settled: config.inference.method == InferenceMethod::Posterior,
+        moved: &moved,
+        depth: depth.as_ref(),
+    };
+    let uncertainty = uncertainty::of(&evidence, &config.reasoning);
     Some(SceneJoint {
         id: String::new(),
         joint,
@@ -226,6 +240,7 @@ fn merge_group(
         type_probability,
         joint_probability,
         hinge_std_m,
+        uncertainty,
         grip,
         face,
         part,

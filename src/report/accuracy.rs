@@ -86,7 +86,7 @@ pub fn details(report: &Report) -> String {
             or_dash(p.recall, share)
         );
     }
-    text + &confidences(report)
+    text + &confidences(report) + &coverage(report)
 }
 
 fn failures(report: &Report) -> String {
@@ -216,6 +216,21 @@ fn confidences(report: &Report) -> String {
     text
 }
 
+/// Empty where no prediction speaks of its errors.
+fn coverage(report: &Report) -> String {
+    if report.coverage.is_empty() {
+        return String::new();
+    }
+    let mut rows = header(["truth within", "answers", "1 std", "expected", "2 std", "expected"]);
+    for c in &report.coverage {
+        let [one, two] = c.expected;
+        let mut row = vec![c.of.to_owned(), c.answers.to_string()];
+        row.extend([c.within_one, one, c.within_two, two].map(share));
+        rows.push(row);
+    }
+    format!("\nerrors in the standard deviations given for them, where the type is right\n{}", aligned(&rows))
+}
+
 /// One set of predictions against another on the same clips.
 #[must_use]
 pub fn paired(rows: &[Paired]) -> String {
@@ -282,7 +297,7 @@ pub fn per_clip(report: &Report) -> String {
 type Column = (&'static str, fn(&Measured) -> Option<f64>);
 
 /// Every measure, in units that spreadsheets take: radians and metres.
-const MEASURES: [Column; 16] = [
+const MEASURES: [Column; 19] = [
     ("axis_rad", |m| Some(m.axis_rad)),
     ("signed_axis_rad", |m| Some(m.signed_axis_rad)),
     ("point_to_point_m", |m| m.point_to_point_m),
@@ -299,6 +314,9 @@ const MEASURES: [Column; 16] = [
     ("radius_error_m", |m| m.radius_error_m),
     ("box_iou", |m| m.box_iou),
     ("box_edge_m", |m| m.box_edge_m),
+    ("axis_sigmas", |m| m.axis_sigmas),
+    ("origin_sigmas", |m| m.origin_sigmas),
+    ("range_sigmas", |m| m.range_sigmas),
 ];
 
 /// What stands before the measures.

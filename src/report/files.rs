@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::articulation::{Articulation, Outcome};
 use crate::evaluation::truth::Stage;
 use crate::evaluation::{Prediction, Predictions};
-use crate::inference::ClipJoint;
+use crate::inference::{ClipJoint, Uncertainty};
 use crate::math::Point;
 use crate::pipeline::{ClipResult, Scene};
 use crate::reasoning::words::Words;
@@ -136,6 +136,8 @@ pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
                 origin: None,
                 contact_pivot: None,
                 range: None,
+                range_std: None,
+                uncertainty: None,
                 part_box: None,
                 confidence: None,
                 joint_confidence: None,
@@ -158,6 +160,11 @@ pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
                 crate::articulation::JointKind::Prismatic => path[0],
             });
             row.range = joint.clips.iter().zip(&joint.moved).find(|(name, _)| **name == c.clip.clip).map(|(_, r)| *r);
+            let said = joint.uncertainty.as_ref();
+            let at = joint.clips.iter().position(|name| *name == c.clip.clip);
+            row.range_std = said.zip(at).and_then(|(u, at)| u.moved_std.get(at).copied());
+            // The joint's other clips have rows of their own.
+            row.uncertainty = said.map(|u| Uncertainty { moved_std: Vec::new(), ..u.clone().about(&phi.axis) });
             row.part_box = part.map(|p| p.bounds);
             row.confidence = Some(joint.type_probability);
             row.joint_confidence = Some(joint.joint_probability);

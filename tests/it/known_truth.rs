@@ -31,6 +31,10 @@ fn without_noise_every_joint_is_right_to_a_degree_and_a_few_centimetres() {
         // A slide's line may run anywhere along its front: origins of slides are exempt in every rule.
         assert!(m.kind == JointKind::Prismatic || m.truth_to_line_m.unwrap() < 0.04, "{clip:?}");
     }
+    // Every answer says how sure it is; slides have no hinge.
+    let hinges = report.per_clip.iter().filter(|c| c.kind == JointKind::Revolute).count();
+    let said: Vec<(&str, usize)> = report.coverage.iter().map(|c| (c.of, c.answers)).collect();
+    assert_eq!(said, [("axis", 12), ("hinge", hinges), ("range", 12)]);
 }
 
 #[test]
