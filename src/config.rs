@@ -300,6 +300,11 @@ block! {
         hand_std_m: f64 = 0.03, "m", "ours";
         /// A hinge this far beside the right one is a wrong one: rivals stand there on all four sides.
         rival_shift_m: f64 = 0.25, "m", "ours";
+        /// Joints in doubt are built and replayed under each of their hypotheses; what physics refutes loses weight.
+        feedback: bool = true, "-", "ours";
+        /// What a hypothesis loses where physics refutes it by what was seen; half by what was assumed. 3 is twenty to one:
+        /// evidence, not a veto.
+        refuted_nats: f64 = 3.0, "nats", "ours";
     }
 }
 
@@ -369,6 +374,7 @@ impl Config {
         config.inference.use_face_normal = false;
         config.inference.merge_clips = false;
         config.inference.refit = false;
+        config.validation.feedback = false;
         config
     }
 
@@ -458,6 +464,8 @@ fn sensible(row: &Row) -> [f64; 2] {
         ("fitting.carcass_depth_m", _) => [0.15, 5.0],
         ("fitting.room_voxel_m", _) => [0.02, 1.0],
         ("validation.step_secs", _) => [1e-4, 0.02],
+        // More is a veto.
+        ("validation.refuted_nats", _) => [1e-3, 20.0],
         (_, "share") => [1e-9, 1.0 - 1e-9],
         (_, "m") => [1e-4, 100.0],
         (_, "s") => [1e-3, 100.0],

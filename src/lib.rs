@@ -6,11 +6,12 @@
 //! ```text
 //! recording ─ hands ─ localization ─ geometry ─ reasoning ─ inference ─ fitting ─ export
 //!             §3.1     §3.1, A.3     §3.2, A.4   §3.3, A.6   §3.4, A.7     │        └ URDF, MJCF, glTF, USD
-//!             A.2                    A.5                     C.2           └ validation (rapier against the hand)
+//!             A.2                    A.5                     C.2           ├ validation (rapier against the hand)
+//!                                                              └─ feedback ─┘
 //! ```
 //!
-//! [`pipeline::infer`] runs the paper and keeps every intermediate result; [`fitting::fit`] builds the twin;
-//! [`validation::validate`] replays the recorded hands; [`export`] writes it.
+//! [`pipeline::infer`] runs the paper and keeps every intermediate result; [`feedback::weighed`] asks physics about joints
+//! in doubt; [`fitting::fit`] builds the twin; [`validation::validate`] replays the recorded hands; [`export`] writes it.
 //!
 //! | paper | here |
 //! |---|---|
@@ -54,6 +55,8 @@ pub mod fitting;
 pub mod evaluation;
 pub mod export;
 pub mod validation;
+
+pub mod feedback;
 
 pub mod report;
 

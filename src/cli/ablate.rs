@@ -1,4 +1,4 @@
-//! `paws ablate`: what each choice is worth.
+//! `paws ablate`: what each choice is worth, the feedback of physics (as `paws infer --physics` has it) among them.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -20,12 +20,13 @@ use crate::report::table::aligned;
 use crate::vlm::Usage;
 
 /// The configurations that are compared where none are named.
-const BUILT_IN: [(&str, &str); 16] = [
+const BUILT_IN: [(&str, &str); 17] = [
     ("ours", include_str!("../../examples/ablations/ours.toml")),
     ("ours_clustered_room", include_str!("../../examples/ablations/ours_clustered_room.toml")),
     ("ours_no_closed_state", include_str!("../../examples/ablations/ours_no_closed_state.toml")),
     ("ours_no_depth_scale", include_str!("../../examples/ablations/ours_no_depth_scale.toml")),
     ("ours_no_face_normal", include_str!("../../examples/ablations/ours_no_face_normal.toml")),
+    ("ours_no_feedback", include_str!("../../examples/ablations/ours_no_feedback.toml")),
     ("ours_no_hand_filter", include_str!("../../examples/ablations/ours_no_hand_filter.toml")),
     ("ours_no_merge", include_str!("../../examples/ablations/ours_no_merge.toml")),
     ("ours_no_occlusion", include_str!("../../examples/ablations/ours_no_occlusion.toml")),

@@ -28,6 +28,10 @@ pub struct InferArgs {
     /// Write predictions (recordings) or joints (trajectories) as JSON to this file
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Let physics speak, too, as `paws twin` does: what runs into furniture loses weight (recordings; unless the
+    /// parameters switch validation.feedback off)
+    #[arg(long)]
+    physics: bool,
     #[command(flatten)]
     config: ConfigFile,
     #[command(flatten)]
@@ -35,7 +39,8 @@ pub struct InferArgs {
 }
 
 pub fn run(args: &InferArgs) -> anyhow::Result<Answer> {
-    let config = args.config.read()?;
+    let mut config = args.config.read()?;
+    config.validation.feedback &= args.physics;
     if let Some(missing) = args.inputs.iter().find(|p| !p.exists()) {
         bail!(
             "{}: no such file or folder; give recordings (folders) or bare trajectories (files of x y z)",
@@ -45,6 +50,9 @@ pub fn run(args: &InferArgs) -> anyhow::Result<Answer> {
     let (folders, trajectories): (Vec<&PathBuf>, Vec<&PathBuf>) = args.inputs.iter().partition(|p| !p.is_file());
     if !folders.is_empty() && !trajectories.is_empty() {
         bail!("give recordings (folders) or bare trajectories (files), not both at once");
+    }
+    if folders.is_empty() && args.physics {
+        bail!("--physics is for recordings (folders): around a bare trajectory there is nothing to run into");
     }
     if folders.is_empty() {
         bare_trajectories(&trajectories, &config, args.out.as_deref())
@@ -105,10 +113,14 @@ pub struct Predicted {
     pub usage: Option<Usage>,
 }
 
-/// Inference and fit of one recording under one configuration.
+/// Inference, what physics says to it where the configuration asks, and fit of one recording.
 pub fn predict(recording: &Recording, config: &Config, asked: Option<&Asked>) -> anyhow::Result<Predicted> {
     let steps = Steps::new();
-    let model::Inferred { scene, usage, .. } = model::infer(recording, config, asked, &steps, false)?;
+    let model::Inferred { mut scene, usage, .. } = model::infer(recording, config, asked, &steps, false)?;
+    if config.validation.feedback {
+        steps.report("weighing", 0, 1);
+        scene.joints = crate::feedback::weighed(&scene, &recording.up(), config);
+    }
     let twin = crate::fitting::fit(&scene, &recording.up(), &config.fitting);
     steps.finish();
     let predictions = files::predictions(&scene, &twin);

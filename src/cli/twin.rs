@@ -20,7 +20,7 @@ use crate::report::table::aligned;
 use crate::report::{files, page, pictures, words};
 use crate::twin::Twin;
 use crate::validation::{self, Validation, Verdict, verdict::Hands};
-use crate::{export, fitting};
+use crate::{export, feedback, fitting};
 
 #[derive(Debug, Args)]
 pub struct TwinArgs {
@@ -120,8 +120,12 @@ pub fn make(
     let output = Output::new(out, Kind::Twin, &[recording])?;
     let recording = Recording::open(recording)?;
     let steps = Steps::new();
-    let model::Inferred { scene, reasoner, usage, exchanges } =
+    let model::Inferred { mut scene, reasoner, usage, exchanges } =
         model::infer(&recording, config, asked, &steps, keep_steps)?;
+    if config.validation.feedback {
+        steps.report("weighing", 0, 1);
+        scene.joints = feedback::weighed(&scene, &recording.up(), config);
+    }
     steps.report("fitting boxes", 0, 1);
     let twin = fitting::fit(&scene, &recording.up(), &config.fitting);
     steps.report("simulating", 0, 1);
@@ -213,6 +217,11 @@ pub fn summary(scene: &Scene, twin: &Twin, validation: &Validation) -> String {
     }
     for left in &twin.left_out {
         reasons += &format!("{}: not built: {}\n", left.id, left.reason);
+    }
+    for joint in &scene.joints {
+        for why in words::refuted(joint) {
+            reasons += &format!("{}: physics speaks against {why}\n", joint.id);
+        }
     }
     if !reasons.is_empty() {
         text += &format!("\n{reasons}");

@@ -77,6 +77,9 @@ pub struct Prediction {
     /// Where the answer was lost, if there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stage: Option<Stage>,
+    /// What physics says against ways in which the part could move, where it was asked.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub refuted: Vec<String>,
 }
 
 impl Predictions {

@@ -353,6 +353,7 @@ fn found(entry: &Entry, frame: &Frame, config: &config::Fitting) -> Result<Found
         uncertainty: None,
         moved: Vec::new(),
         observed_range: upper,
+        hypotheses: Vec::new(),
     };
     Ok(Found { joint, face, rect, depth: depth.clamp(0.15, 5.0), boxes })
 }

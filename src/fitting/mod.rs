@@ -47,7 +47,13 @@ struct Plan<'a> {
 /// Builds the twin of a scene.
 #[must_use]
 pub fn fit(scene: &Scene, up: &Vector, config: &config::Fitting) -> Twin {
-    let mut plans: Vec<Plan> = scene.joints.iter().map(|j| plan(j, up, config)).collect();
+    fit_joints(scene, &scene.joints, up, config)
+}
+
+/// The same with other joints in the place of the scene's own: what the twin would be under another hypothesis.
+#[must_use]
+pub fn fit_joints(scene: &Scene, joints: &[SceneJoint], up: &Vector, config: &config::Fitting) -> Twin {
+    let mut plans: Vec<Plan> = joints.iter().map(|j| plan(j, up, config)).collect();
     let mut rects: Vec<(Face, Rect)> = plans.iter().map(|p| (p.face, p.rect)).collect();
     overlap::separate(&mut rects, config);
     for (plan, (_, rect)) in plans.iter_mut().zip(rects) {
@@ -464,6 +470,7 @@ mod tests {
             part: Some(Rect { bounds: [[-0.5, 0.06], [-0.3, 0.1]] }),
             observed_range: 0.4,
             moved: vec![],
+            hypotheses: vec![],
         }
     }
 

@@ -172,6 +172,54 @@ pub fn tempered(probability: f64, temperature: f64) -> f64 {
     1.0 / (1.0 + (-(p / (1.0 - p)).ln() / temperature).exp())
 }
 
+/// One way to explain a motion: candidates that are the same joint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Explanation {
+    /// Indices of the candidates, the likeliest first; never empty.
+    pub members: Vec<usize>,
+    /// Probability of its type, not tempered.
+    pub type_share: f64,
+    /// Probability of its type and axis, not tempered.
+    pub share: f64,
+}
+
+/// The explanations of a motion under the reasoner's weights, each candidate in one of them: first the answer (of the
+/// likelier type the likeliest candidate, with those that agree), then the others by falling share. The shares add up to 1.
+#[must_use]
+pub fn explanations(candidates: &[AxisCandidate], answer: &Answer) -> Vec<Explanation> {
+    let revolute = answer.revolute_probability(candidates);
+    let weights = answer.log_weights();
+    let mut all = Vec::new();
+    for (kind, type_share) in [(JointKind::Revolute, revolute), (JointKind::Prismatic, 1.0 - revolute)] {
+        let mut left: Vec<(usize, f64)> = candidates
+            .iter()
+            .zip(&weights)
+            .enumerate()
+            .filter(|(_, (c, w))| c.joint.kind == kind && w.is_finite())
+            .map(|(i, (_, w))| (i, *w))
+            .collect();
+        left.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let Some(&(_, top)) = left.first() else { continue };
+        let mass = |some: &[(usize, f64)]| some.iter().map(|(_, w)| (w - top).exp()).sum::<f64>();
+        let total = mass(&left);
+        while let Some(&(head, _)) = left.first() {
+            let joint = candidates[head].joint;
+            let (same, rest): (Vec<_>, Vec<_>) =
+                left.into_iter().partition(|(i, _)| *i == head || same_axis(&candidates[*i].joint, &joint));
+            let share = type_share * mass(&same) / total;
+            all.push(Explanation { members: same.into_iter().map(|(i, _)| i).collect(), type_share, share });
+            left = rest;
+        }
+    }
+    let likelier = if revolute >= 0.5 { JointKind::Revolute } else { JointKind::Prismatic };
+    let is_likelier = |e: &Explanation| e.members.first().is_some_and(|&i| candidates[i].joint.kind == likelier);
+    if let Some(at) = all.iter().position(is_likelier) {
+        all[..=at].rotate_right(1);
+        all[1..].sort_by(|a, b| b.share.total_cmp(&a.share));
+    }
+    all
+}
+
 /// Of the weight of all joints of `best`'s type the share of those that are the same explanation.
 #[must_use]
 pub fn agreeing_share(best: &Articulation, all: &[(Articulation, f64)]) -> f64 {
@@ -197,4 +245,40 @@ pub(crate) fn mean_direction(directions: &[(Vector, f64)]) -> Option<Vector> {
     let axis: Vector = axes.column(0).into_owned();
     let first = directions.first()?.0;
     Some(if axis.dot(&first) < 0.0 { -axis } else { axis })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn candidate(kind: JointKind, x: f64) -> AxisCandidate {
+        let axis = if kind == JointKind::Revolute { Vector::z() } else { -Vector::y() };
+        AxisCandidate::new(Articulation { kind, axis, origin: Point::new(x, 0.0, 0.0) }, AxisSource::Line)
+    }
+
+    #[test]
+    fn candidates_of_one_joint_are_one_explanation_and_the_answer_comes_first() {
+        let hinge = |x: f64| candidate(JointKind::Revolute, x);
+        // A hinge seen twice outweighs the likeliest one, which stays the answer; a slide; a hinge that is ruled out.
+        let candidates = [candidate(JointKind::Prismatic, 0.0), hinge(0.5), hinge(-0.5), hinge(-0.47), hinge(0.0)];
+        let weights: [f64; 5] = [0.2, 0.3, 0.25, 0.25, 0.0];
+        let answer = Answer {
+            log_likelihoods: weights.iter().map(|w| w.ln()).collect(),
+            log_priors: vec![0.0; 5],
+            words_log_odds: 0.0,
+        };
+        let all = explanations(&candidates, &answer);
+        let members: Vec<&[usize]> = all.iter().map(|e| e.members.as_slice()).collect();
+        let expected: [&[usize]; 3] = [&[1], &[2, 3], &[0]];
+        assert_eq!(members, expected);
+        for (e, (share, type_share)) in all.iter().zip([(0.3, 0.8), (0.5, 0.8), (0.2, 0.2)]) {
+            assert!((e.share - share).abs() < 1e-12 && (e.type_share - type_share).abs() < 1e-12, "{e:?}");
+        }
+        // Words count for the types, not within them.
+        let told = explanations(&candidates, &Answer { words_log_odds: -(2f64.ln()), ..answer });
+        assert!((told[0].share - 0.3 / 0.8 * told[0].type_share).abs() < 1e-12 && told[0].type_share < 0.8);
+        assert!((told.iter().map(|e| e.share).sum::<f64>() - 1.0).abs() < 1e-12);
+        let nothing = Answer { log_likelihoods: vec![], log_priors: vec![], words_log_odds: 1.0 };
+        assert!(explanations(&[], &nothing).is_empty());
+    }
 }

@@ -85,6 +85,50 @@ pub struct SceneJoint {
     pub observed_range: f64,
     /// Opening that each of `clips` went through, rad or m.
     pub moved: Vec<f64>,
+    /// How the part could move, its own joint first; one alone where nothing else has a hundredth of all weight, none where
+    /// nothing was weighed.
+    #[serde(default)]
+    pub hypotheses: Vec<Hypothesis>,
+}
+
+/// One way in which a part could move, with what depends on it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Hypothesis {
+    /// The joint; positive opens.
+    pub joint: Articulation,
+    /// Probability of type and axis, not tempered: of the weight of all explanations the share that agrees. The hypotheses
+    /// of a part share at most 1.
+    pub share: f64,
+    /// Probability of its type, not tempered.
+    pub type_share: f64,
+    /// As [`SceneJoint::hinge_std_m`].
+    pub hinge_std_m: Option<f64>,
+    /// As [`SceneJoint::uncertainty`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<Uncertainty>,
+    /// As [`SceneJoint::part`].
+    pub part: Option<Rect>,
+    /// As [`SceneJoint::moved`].
+    pub moved: Vec<f64>,
+    /// What physics says against it, where it was asked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refuted: Option<String>,
+}
+
+impl SceneJoint {
+    /// The same part under one of its hypotheses; its probabilities stay as they are.
+    #[must_use]
+    pub fn under(&self, hypothesis: &Hypothesis) -> Self {
+        Self {
+            joint: hypothesis.joint,
+            hinge_std_m: hypothesis.hinge_std_m,
+            uncertainty: hypothesis.uncertainty.clone(),
+            part: hypothesis.part,
+            observed_range: hypothesis.moved.iter().copied().fold(0.0, f64::max),
+            moved: hypothesis.moved.clone(),
+            ..self.clone()
+        }
+    }
 }
 
 /// The scene.

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::clip::{self, part_shape};
 use super::refit;
-use super::{ClipResult, SceneJoint};
+use super::{ClipResult, Hypothesis, SceneJoint};
 use crate::articulation::{Articulation, JointKind};
 use crate::config::{Config, InferenceMethod};
 use crate::geometry::Rect;
@@ -89,7 +89,52 @@ fn pooled(
     all
 }
 
-/// All candidates of all clips of one part, judged on every clip: the best explains all of them.
+/// What the clips of one part say together.
+struct Judged {
+    /// The clip that saw the closed part best: it gives the face, the grip and the part's outline.
+    best: usize,
+    /// That clip's grip when closed, world.
+    grip: Point,
+    /// How the part could move, the answer first; never empty.
+    likely: Vec<Likely>,
+    /// Of the answer, tempered.
+    type_probability: f64,
+    joint_probability: f64,
+}
+
+/// One way in which a part could move; see [`inference::Explanation`].
+struct Likely {
+    joint: Articulation,
+    /// The candidate that stands for it.
+    chosen: AxisCandidate,
+    share: f64,
+    type_share: f64,
+}
+
+/// The answer and what else is worth a look. `merged`: candidates of several clips, of which those that agree are averaged.
+fn likely(candidates: &[AxisCandidate], answer: &Answer, merged: bool) -> Vec<Likely> {
+    // No evidence of a few nats brings less back.
+    const LEAST_SHARE: f64 = 0.01;
+    const MOST: usize = 5;
+    let weights = answer.log_weights();
+    inference::explanations(candidates, answer)
+        .into_iter()
+        .enumerate()
+        .filter(|(i, e)| *i == 0 || e.share >= LEAST_SHARE)
+        .take(MOST)
+        .filter_map(|(_, e)| {
+            let &head = e.members.first()?;
+            let members: Vec<(Articulation, f64)> =
+                e.members.iter().map(|&i| (candidates[i].joint, (weights[i] - weights[head]).exp())).collect();
+            let seed = candidates[head].joint;
+            let joint = if merged { aggregate::consensus(&seed, &members) } else { seed };
+            let chosen = candidates[head].clone();
+            Some(Likely { joint, chosen, share: e.share, type_share: e.type_share })
+        })
+        .collect()
+}
+
+/// One part's joint, and how else it could move.
 fn merge_group(
     recording: &Recording,
     sketches: &BTreeMap<usize, Sketch>,
@@ -98,6 +143,41 @@ fn merge_group(
     reasoner: &dyn Reasoner,
     config: &Config,
 ) -> Option<SceneJoint> {
+    let judged = judged(recording, sketches, clips, group, reasoner, config)?;
+    let hypotheses: Vec<Hypothesis> =
+        judged.likely.iter().map(|l| built(recording, sketches, clips, group, &judged, l, config)).collect();
+    let answer = hypotheses.first()?.clone();
+    Some(SceneJoint {
+        id: String::new(),
+        joint: answer.joint,
+        clips: group.iter().map(|&c| clips[c].clip.clip.clone()).collect(),
+        // Where people said "it", a model may have seen what it was.
+        furniture: group
+            .iter()
+            .find_map(|&c| narration::read(&clips[c].clip).furniture)
+            .or_else(|| group.iter().find_map(|&c| clips[c].words.as_ref()?.furniture.clone())),
+        type_probability: judged.type_probability,
+        joint_probability: judged.joint_probability,
+        hinge_std_m: answer.hinge_std_m,
+        uncertainty: answer.uncertainty,
+        grip: judged.grip,
+        face: clips[judged.best].face,
+        part: answer.part,
+        observed_range: answer.moved.iter().copied().fold(0.0, f64::max),
+        moved: answer.moved,
+        hypotheses,
+    })
+}
+
+/// All candidates of all clips of one part, judged on every clip: the best explains all of them.
+fn judged(
+    recording: &Recording,
+    sketches: &BTreeMap<usize, Sketch>,
+    clips: &[ClipResult],
+    group: &[usize],
+    reasoner: &dyn Reasoner,
+    config: &Config,
+) -> Option<Judged> {
     // The clip that saw the closed part best gives the face, the grip and the part's outline.
     let trust = |c: usize| -> f64 {
         let clip = &clips[c];
@@ -115,7 +195,7 @@ fn merge_group(
     let face = clips[best].face;
     let (mut joint, mut type_probability) = (best_joint.joint, best_joint.type_probability);
     let mut joint_probability = best_joint.joint_probability;
-    let mut chosen = uncertainty::chosen(best_joint, &clips[best].candidates);
+    let mut all_likely = Vec::new();
     if group.len() > 1 && config.inference.method == InferenceMethod::Paper {
         // The clips' own joints, one voice each.
         let all: Vec<(Articulation, f64)> =
@@ -183,16 +263,39 @@ fn merge_group(
             let all: Vec<(Articulation, f64)> =
                 pooled.iter().zip(&weights).map(|(k, w)| (k.joint, (w - weights[top]).exp())).collect();
             joint = aggregate::consensus(&pooled[top].joint, &all);
-            chosen = pooled[top].clone();
             let raw = revolute_probability.max(1.0 - revolute_probability);
             let temperature = config.inference.temperature;
             type_probability = inference::tempered(raw, temperature);
             joint_probability =
                 inference::tempered(raw * inference::agreeing_share(&pooled[top].joint, &all), temperature);
+            all_likely = likely(&pooled, &answer, true);
+        }
+    } else if let (InferenceMethod::Posterior, Some(answer)) = (config.inference.method, &clips[best].answer) {
+        all_likely = likely(&clips[best].candidates, answer, false);
+    }
+    match all_likely.first_mut() {
+        Some(answer) => answer.joint = joint,
+        None => {
+            let chosen = uncertainty::chosen(best_joint, &clips[best].candidates);
+            all_likely.push(Likely { joint, chosen, share: 1.0, type_share: 1.0 });
         }
     }
+    Some(Judged { best, grip, likely: all_likely, type_probability, joint_probability })
+}
+
+/// A part under one of its joints: which way it opens, then hinge, openings and outline from the depth of the open state.
+fn built(
+    recording: &Recording,
+    sketches: &BTreeMap<usize, Sketch>,
+    clips: &[ClipResult],
+    group: &[usize],
+    judged: &Judged,
+    likely: &Likely,
+    config: &Config,
+) -> Hypothesis {
+    let (best, face) = (judged.best, clips[judged.best].face);
     let trajectories = || group.iter().filter_map(|&c| clips[c].trajectory.as_ref());
-    joint = inference::opening_sense(joint, face.as_ref(), &grip, trajectories());
+    let mut joint = inference::opening_sense(likely.joint, face.as_ref(), &judged.grip, trajectories());
     let shown: Vec<(&ClipResult, &Trajectory)> =
         group.iter().filter_map(|&c| Some((&clips[c], clips[c].trajectory.as_ref()?))).collect();
     let mut hinge_std_m = None;
@@ -217,10 +320,9 @@ fn merge_group(
             part = votes.moving_rect(&stops).or(part);
         }
     }
-    let observed_range = moved.iter().copied().fold(0.0, f64::max);
     let evidence = uncertainty::Evidence {
         joint: &joint,
-        chosen: &chosen,
+        chosen: &likely.chosen,
         face: face.as_ref(),
         hands: &shown.iter().map(|(_, t)| *t).collect::<Vec<_>>(),
         settled: config.inference.method == InferenceMethod::Posterior,
@@ -228,23 +330,14 @@ fn merge_group(
         depth: depth.as_ref(),
     };
     let uncertainty = uncertainty::of(&evidence, &config.reasoning);
-    Some(SceneJoint {
-        id: String::new(),
+    Hypothesis {
         joint,
-        clips: group.iter().map(|&c| clips[c].clip.clip.clone()).collect(),
-        // Where people said "it", a model may have seen what it was.
-        furniture: group
-            .iter()
-            .find_map(|&c| narration::read(&clips[c].clip).furniture)
-            .or_else(|| group.iter().find_map(|&c| clips[c].words.as_ref()?.furniture.clone())),
-        type_probability,
-        joint_probability,
+        share: likely.share,
+        type_share: likely.type_share,
         hinge_std_m,
         uncertainty,
-        grip,
-        face,
         part,
-        observed_range,
         moved,
-    })
+        refuted: None,
+    }
 }

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::words;
 use crate::articulation::{Articulation, Outcome};
 use crate::evaluation::truth::Stage;
 use crate::evaluation::{Prediction, Predictions};
@@ -22,6 +23,8 @@ struct JointEntry<'a> {
     observed_range: f64,
     grip: Point,
     clips: &'a [String],
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    refuted: Vec<String>,
 }
 
 /// One clip of `articulations.json`.
@@ -81,6 +84,7 @@ pub fn articulations(scene: &Scene, reasoner: &str) -> crate::error::Result<Stri
                 observed_range: j.observed_range,
                 grip: j.grip,
                 clips: &j.clips,
+                refuted: words::refuted(j),
             })
             .collect(),
         clips: scene
@@ -144,6 +148,7 @@ pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
                 joint: None,
                 reason: c.joint.reason().map(str::to_owned),
                 stage: c.joint.reason().map(|_| stage(c)),
+                refuted: Vec::new(),
             };
             let joint = scene.joints.iter().find(|j| j.clips.contains(&c.clip.clip));
             let part = joint.and_then(|j| twin.furniture.iter().map(|f| &f.part).find(|p| p.id == j.id));
@@ -169,6 +174,7 @@ pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
             row.confidence = Some(joint.type_probability);
             row.joint_confidence = Some(joint.joint_probability);
             row.joint = Some(joint.id.clone());
+            row.refuted = words::refuted(joint);
             row
         })
         .collect();

@@ -1,8 +1,8 @@
 //! Joints in words for people.
 
-use crate::articulation::{JointKind, Outcome};
+use crate::articulation::{Articulation, JointKind, Outcome};
 use crate::geometry::Face;
-use crate::pipeline::ClipResult;
+use crate::pipeline::{ClipResult, SceneJoint};
 use crate::twin::Part;
 
 /// An opening for people: degrees or centimetres.
@@ -49,7 +49,23 @@ pub fn sure(probability: f64) -> String {
 /// Where the axis is, seen by the person: "upright, left"; or where it leads: "straight out".
 #[must_use]
 pub fn axis(part: &Part, face: Option<&Face>) -> String {
-    let phi = part.joint.articulation;
+    place(&part.joint.articulation, face)
+}
+
+/// What physics says against ways in which a part could move: "slide (straight out): its front runs into a wall".
+#[must_use]
+pub fn refuted(joint: &SceneJoint) -> Vec<String> {
+    joint
+        .hypotheses
+        .iter()
+        .filter_map(|h| {
+            let why = h.refuted.as_ref()?;
+            Some(format!("{} ({}): {why}", h.joint.kind.word(), place(&h.joint, joint.face.as_ref())))
+        })
+        .collect()
+}
+
+fn place(phi: &Articulation, face: Option<&Face>) -> String {
     let upright = phi.axis.z.abs() > 0.8;
     let level = phi.axis.z.abs() < 0.2;
     let tilt = if upright {

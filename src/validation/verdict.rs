@@ -361,17 +361,33 @@ fn reached(clip: &ClipCheck) -> f64 {
     clip.replay.reached[1] - clip.replay.reached[0]
 }
 
+/// Metres that lack at the handle where a part goes through too little of the range that the hand went through (rad or m);
+/// `None` where it does not, or where grip and a hand of this noise make it up.
+pub(crate) fn lacking(
+    part: &Part,
+    replay: &Replay,
+    observed_range: f64,
+    noise_m: f64,
+    config: &config::Validation,
+) -> Option<f64> {
+    let reached = replay.reached[1] - replay.reached[0];
+    let lacking = (observed_range - reached) * part.joint.articulation.lever(&replay.grip);
+    let enough = reached >= config.pass_range_share * observed_range || lacking <= made_up_m(noise_m, config);
+    (!enough).then_some(lacking)
+}
+
+/// Metres at the handle that grip and a hand of this noise make up: the slack at both ends, and two standard deviations of
+/// the difference of two positions of the hand.
+pub(crate) fn made_up_m(noise_m: f64, config: &config::Validation) -> f64 {
+    2.0 * config.grip_slack_m + 2.0 * std::f64::consts::SQRT_2 * noise_m.max(config.hand_std_m)
+}
+
 /// What keeps a part from going where the hand went: metres lacking at the handle, and why in words.
 fn blocked(part: &Part, clip: &ClipCheck, config: &config::Validation) -> Option<(f64, String)> {
     let joint = &part.joint;
     let kind = joint.articulation.kind;
-    let lever = joint.articulation.lever(&clip.replay.grip);
-    let lacking = (clip.observed_range - reached(clip)) * lever;
-    let made_up = 2.0 * config.grip_slack_m + 2.0 * std::f64::consts::SQRT_2 * clip.noise_m.max(config.hand_std_m);
-    if reached(clip) >= config.pass_range_share * clip.observed_range || lacking <= made_up {
-        return None;
-    }
     let replay = &clip.replay;
+    let lacking = lacking(part, replay, clip.observed_range, clip.noise_m, config)?;
     let why = if replay.limit_steps[1] > 0 {
         format!("it stops at its limit of {}", amount(kind, joint.upper))
     } else if let Some(contact) = replay.contacts.first() {
@@ -420,7 +436,8 @@ fn one_in(nats: f64) -> String {
     }
 }
 
-fn amount(kind: JointKind, opening: f64) -> String {
+/// An opening for people: degrees or centimetres.
+pub(crate) fn amount(kind: JointKind, opening: f64) -> String {
     match kind {
         JointKind::Revolute => format!("{:.0}°", opening.to_degrees()),
         JointKind::Prismatic => format!("{:.0} cm", 100.0 * opening),

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-const FLOORS: [&[&str]; 16] = [
+const FLOORS: [&[&str]; 17] = [
     &["error"],
     &["json", "math"],
     &["articulation", "vlm"],
@@ -18,6 +18,7 @@ const FLOORS: [&[&str]; 16] = [
     &["pipeline"],
     &["fitting"],
     &["export", "validation", "evaluation"],
+    &["feedback"],
     &["report"],
     &["cli"],
 ];
