@@ -58,14 +58,17 @@ pub(super) fn refitted<'a>(
         .collect();
     let ends = left_where_found(shown, &ends);
     let ranges = ends.iter().map(|end| end.value.max(0.0)).collect();
+    // The views share a hand, a depth estimate and an outline: what they say together is tempered as probabilities are, which
+    // for a covariance is a factor.
+    let shared = config.inference.temperature;
     let depth = OpenStates {
         across: fit.across,
-        hinge_cov_m2: fit.hinge_cov_m2,
-        moved_std: ends.iter().map(|end| end.std).collect(),
+        hinge_cov_m2: fit.hinge_cov_m2.map(|rows| rows.map(|row| row.map(|x| shared * x))),
+        moved_std: ends.iter().map(|end| shared.sqrt() * end.std).collect(),
     };
     let openings = fit.openings.iter().flatten().map(|o| o.value).collect();
     let views = views.into_iter().flatten().collect();
-    Some(Refitted { joint: fit.joint, views, openings, position_std_m: fit.position_std_m, ranges, depth })
+    Some(Refitted { joint: fit.joint, views, openings, position_std_m: shared.sqrt() * fit.position_std_m, ranges, depth })
 }
 
 /// Opening at the open end of a clip. After the hand let go the part stands there: what those views show counts, else what is
