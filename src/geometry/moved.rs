@@ -27,8 +27,10 @@ pub struct View<'a> {
 /// What ties the part's place in a view to the hand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Hold {
-    /// The hand holds the part, or was seen to let go of it.
+    /// The hand holds the part.
     Sure,
+    /// The hand was seen to let go of the part, or to take hold of it later, as far as contact is told rightly.
+    Free,
     /// The hand is gone and was not seen to let go: the part may be on its way.
     Lost,
     /// The same after the narration's end (or before its start): the part stands.
@@ -37,11 +39,17 @@ pub enum Hold {
 
 impl Hold {
     /// All of them.
-    pub(super) const ALL: [Self; 3] = [Self::Sure, Self::Lost, Self::Left];
+    pub(super) const ALL: [Self; 4] = [Self::Sure, Self::Free, Self::Lost, Self::Left];
 
     /// What a grip of `grip_std_m` is worth in such a view, metres.
     pub(super) fn std_m(self, grip_std_m: f64) -> f64 {
-        if self == Self::Sure { grip_std_m } else { grip_std_m.hypot(crate::hands::grip_std_m(false)) }
+        let after = match self {
+            Self::Sure => 0.0,
+            // Contact flags are wrong now and then: half of a grip that was lost.
+            Self::Free => 0.5 * crate::hands::grip_std_m(false),
+            Self::Lost | Self::Left => crate::hands::grip_std_m(false),
+        };
+        grip_std_m.hypot(after)
     }
 }
 
@@ -126,7 +134,7 @@ pub fn open_frames(recording: &Recording, clip: &Clip, trajectory: &Trajectory) 
     };
     let end = if trajectory.action == Action::Open { last } else { first };
     if trajectory.open_end_seen() {
-        after(end, Hold::Sure);
+        after(end, Hold::Free);
     } else {
         // A hand that was lost may have moved the part until the narration ends.
         after(end, Hold::Lost);

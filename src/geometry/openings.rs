@@ -254,7 +254,7 @@ fn coarse(sights: &Sights, joint: &Articulation, clip: &OpenState, views: &[Seen
         .filter(|offset| widest + offset > 0.0)
         .map(|offset| {
             let x = offset / std;
-            let seen = sights::log_likelihood(sights::seen_share(sights, joint, &clip.grip, hold, offset));
+            let seen = sights::log_likelihood(sights::seen_share(sights, joint, &clip.grip, &[hold], offset));
             (seen - 0.5 * (TAIL + 1.0) * (x * x / TAIL).ln_1p(), offset)
         })
         .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.abs().total_cmp(&a.1.abs())))

@@ -170,18 +170,18 @@ impl Rays {
         Self { face_from_world, center: face.center, outline: outline.copied(), views, weight }
     }
 
-    /// Whether any view has this hold.
-    pub(super) fn has(&self, hold: Hold) -> bool {
-        self.views.iter().any(|v| v.hold == hold)
+    /// Whether any view has one of these holds.
+    pub(super) fn has(&self, holds: &[Hold]) -> bool {
+        self.views.iter().any(|v| holds.contains(&v.hold))
     }
 
     /// Log likelihood of the views of one sort under a joint, against that nothing moved, in nats. `offset` (rad or m) is
     /// added to the opening that the hand tells.
-    pub(super) fn log_likelihood(&self, joint: &Articulation, grip: &Point, hold: Hold, offset: f64) -> f64 {
+    pub(super) fn log_likelihood(&self, joint: &Articulation, grip: &Point, holds: &[Hold], offset: f64) -> f64 {
         let axis = self.face_from_world * joint.axis;
         let origin = self.face_from_world * (joint.origin - self.center);
         let mut sum = 0.0;
-        for view in self.views.iter().filter(|v| v.hold == hold) {
+        for view in self.views.iter().filter(|v| holds.contains(&v.hold)) {
             let opening = joint.opening_at(grip, &view.grip) + offset;
             // The leaf stays and the eye goes back instead, with its rays.
             let (back, eye) = match joint.kind {

@@ -24,6 +24,9 @@ const MOST_NATS: f64 = 10.0;
 /// Between two offsets, metres: what the depth's tolerance bridges.
 const STEP_M: f64 = 0.02;
 
+/// Views whose offsets are one when joints are judged: what lets a wrong joint choose freely tells less.
+const TOGETHER: [&[Hold]; 3] = [&[Hold::Sure, Hold::Free], &[Hold::Lost], &[Hold::Left]];
+
 /// How well a joint explains the open views, in nats against that nothing moved.
 ///
 /// Hands and depth disagree by a few centimetres that stay the same over a clip (a hand's distance is the least certain thing
@@ -42,22 +45,22 @@ fn by_rays(rays: &Rays, joint: &Articulation, grip: &Point, grip_std_m: f64) -> 
     const STEPS: f64 = 5.0;
     let lever = joint.lever(grip).max(0.05);
     // Where a hand was lost before it let go, the views after that have an offset of their own.
-    let of = |hold: Hold| -> f64 {
-        let std_m = hold.std_m(grip_std_m);
+    let of = |holds: &[Hold]| -> f64 {
+        let std_m = holds.iter().map(|h| h.std_m(grip_std_m)).fold(f64::INFINITY, f64::min);
         let step = STEP_M.max(REACH * std_m / STEPS);
         let reach = (REACH * std_m / step).round() as i32;
         let terms: Vec<(f64, f64)> = (-reach..=reach)
             .map(|k| {
                 let offset = f64::from(k) * step;
                 let prior = (-0.5 * (offset / std_m).powi(2)).exp();
-                (prior, rays.log_likelihood(joint, grip, hold, offset / lever))
+                (prior, rays.log_likelihood(joint, grip, holds, offset / lever))
             })
             .collect();
         let top = terms.iter().map(|(_, l)| *l).fold(f64::NEG_INFINITY, f64::max);
         let believed: f64 = terms.iter().map(|(prior, _)| prior).sum();
         top + (terms.iter().map(|(prior, l)| prior * (l - top).exp()).sum::<f64>() / believed).ln()
     };
-    let total: f64 = Hold::ALL.into_iter().filter(|h| rays.has(*h)).map(of).sum();
+    let total: f64 = TOGETHER.into_iter().filter(|holds| rays.has(holds)).map(of).sum();
     MOST_NATS * (total / MOST_NATS).tanh()
 }
 
@@ -72,10 +75,10 @@ fn by_points(sights: &Sights, joint: &Articulation, grip: &Point, grip_std_m: f6
     const SHARE_PER_NAT: f64 = 1.0 / 18.0;
     let lever = joint.lever(grip).max(0.05);
     // Where a hand was lost before it let go, the views after that have an offset of their own.
-    let of = |hold: Hold| -> (f64, usize) {
-        let std_m = hold.std_m(grip_std_m);
+    let of = |holds: &[Hold]| -> (f64, usize) {
+        let std_m = holds.iter().map(|h| h.std_m(grip_std_m)).fold(f64::INFINITY, f64::min);
         let at = |offset: f64| -> (f64, usize) {
-            let (share, count) = seen_share(sights, joint, grip, hold, offset / lever);
+            let (share, count) = seen_share(sights, joint, grip, holds, offset / lever);
             ((share - SHARE_PER_NAT * 0.5 * (offset / std_m).powi(2)).max(0.0), count)
         };
         // An offset under which nothing moves clearly explains nothing; of equal offsets the first is kept.
@@ -98,8 +101,8 @@ fn by_points(sights: &Sights, joint: &Articulation, grip: &Point, grip_std_m: f6
         best.1
     };
     let (mut explained, mut count) = (0.0, 0);
-    for hold in Hold::ALL.into_iter().filter(|h| sights.views.iter().any(|v| v.hold == *h)) {
-        let (share, points) = of(hold);
+    for holds in TOGETHER.iter().filter(|holds| sights.views.iter().any(|v| holds.contains(&v.hold))) {
+        let (share, points) = of(holds);
         explained += share * points as f64;
         count += points;
     }
@@ -146,10 +149,16 @@ impl<'a> Sights<'a> {
 }
 
 /// The share of [`by_points`] in the views of one sort, with `offset` (rad or m) added to the opening that the hand tells.
-pub(super) fn seen_share(sights: &Sights, joint: &Articulation, grip: &Point, hold: Hold, offset: f64) -> (f64, usize) {
+pub(super) fn seen_share(
+    sights: &Sights,
+    joint: &Articulation,
+    grip: &Point,
+    holds: &[Hold],
+    offset: f64,
+) -> (f64, usize) {
     let Sights { face, bounds, .. } = sights;
     let (mut explained, mut count) = (0usize, 0usize);
-    for (view, closed) in sights.views.iter().zip(&sights.closed).filter(|(v, _)| v.hold == hold) {
+    for (view, closed) in sights.views.iter().zip(&sights.closed).filter(|(v, _)| holds.contains(&v.hold)) {
         let motion = joint.motion(joint.opening_at(grip, &view.grip) + offset);
         let back = motion.inverse();
         for (here, closed) in sights.points.iter().zip(closed) {

@@ -68,7 +68,14 @@ pub(super) fn refitted<'a>(
     };
     let openings = fit.openings.iter().flatten().map(|o| o.value).collect();
     let views = views.into_iter().flatten().collect();
-    Some(Refitted { joint: fit.joint, views, openings, position_std_m: shared.sqrt() * fit.position_std_m, ranges, depth })
+    Some(Refitted {
+        joint: fit.joint,
+        views,
+        openings,
+        position_std_m: shared.sqrt() * fit.position_std_m,
+        ranges,
+        depth,
+    })
 }
 
 /// Opening at the open end of a clip. After the hand let go the part stands there: what those views show counts, else what is
@@ -88,7 +95,7 @@ fn open_end(joint: &Articulation, trajectory: &Trajectory, state: &OpenState, se
         (total > 0.0).then(|| sum / total)
     };
     let of = |hold: Hold| mean(&|i| (state.views[i].hold == hold && seen[i].informed).then_some(seen[i].value));
-    let after = of(Hold::Left).or(of(Hold::Lost));
+    let after = of(Hold::Left).or(of(Hold::Lost)).or(of(Hold::Free));
     let during = mean(&|i| (state.views[i].hold == Hold::Sure && told[i] > 0.8 * end).then(|| seen[i].value - told[i]));
     let value = after.or(during.map(|offset| end + offset)).unwrap_or(end);
     // The views share the hand's and the depth's errors: together they are as sure as the surest of them. A hand that was lost
