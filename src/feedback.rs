@@ -15,7 +15,7 @@
 //! | an arm strains and it does not follow: its mass is assumed | 1/2 |
 //! | surer furniture leaves no place to build it | 1/2 |
 //!
-//! What is told by replays is the mean over the clips. Of all that speaks against a hypothesis the weightiest counts, times
+//! What is told by replays is the mean over the clips that could be replayed. Of all that speaks against a hypothesis the weightiest counts, times
 //! `validation.refuted_nats`. One round: every joint is judged among the others as they were before.
 //!
 //! Of the room, floor and walls count. What else of it stands in the way may be this very part, seen where it was left open.
@@ -146,13 +146,13 @@ fn refutation(
     let around = Surroundings::of(&twin, at, up);
     let told: Vec<Option<Refutation>> = clips
         .iter()
-        .map(|(clip, grip, range)| {
+        .filter_map(|(clip, grip, range)| {
             let drive =
                 Drive { times_secs: clip.times_secs.clone(), path: clip.path.clone(), grip: *grip, back: false };
-            // That something cannot be simulated says nothing about the kitchen.
+            // What cannot be simulated says nothing about the kitchen, for or against.
             let replay = simulate(part, &phi, upper, &around, &drive, config).ok()?;
-            lacking(part, &replay, *range, clip.noise_m, config)?;
-            stopped(&twin, &replay, config)
+            let lacks = lacking(part, &replay, *range, clip.noise_m, config).is_some();
+            Some(if lacks { stopped(&twin, &replay, config) } else { None })
         })
         .collect();
     let mean = told.iter().flatten().map(|r| r.weight).sum::<f64>() / told.len().max(1) as f64;

@@ -29,11 +29,11 @@ pub struct View<'a> {
 pub enum Hold {
     /// The hand holds the part.
     Sure,
-    /// The hand was seen to let go of the part, or to take hold of it later, as far as contact is told rightly.
+    /// Just after the hand was seen to let go of the open part, or just before it was seen to take hold of it. Contact flags err.
     Free,
-    /// The hand is gone and was not seen to let go: the part may be on its way.
+    /// The hand went out of sight while it held the part, which may still be on its way.
     Lost,
-    /// The same after the narration's end (or before its start): the part stands.
+    /// As `Lost`, but after the narration's end (closing: before its start): the part stands.
     Left,
 }
 
@@ -53,6 +53,8 @@ impl Hold {
     }
 }
 
+/// A surface nearer to the eye than this is none, metres.
+pub(super) const NEAREST_M: f64 = 0.15;
 /// A leaf seen at less than this slant (cosine) shows its edge.
 pub(super) const GRAZING: f64 = 0.2;
 
@@ -81,7 +83,7 @@ impl View<'_> {
     /// `None` outside the image, under a hand or where there is no depth.
     pub(super) fn gap(&self, p: &Point) -> Option<(f64, f64)> {
         let local = self.camera_from_world * p;
-        let (u, v) = self.camera.project(&local).filter(|_| local.z > 0.15)?;
+        let (u, v) = self.camera.project(&local).filter(|_| local.z > NEAREST_M)?;
         let (x, y) = self.sketch.sample(u, v)?;
         let z = f64::from(self.sketch.depth.data[y * self.sketch.depth.width + x]) * self.factor;
         (z > 0.0).then_some((z - local.z, local.z))
@@ -137,11 +139,14 @@ pub fn open_frames(recording: &Recording, clip: &Clip, trajectory: &Trajectory) 
         after(end, Hold::Free);
     } else {
         // A hand that was lost may have moved the part until the narration ends.
-        after(end, Hold::Lost);
-        after(
-            if trajectory.action == Action::Open { last.max(clip.end_frame) } else { first.min(clip.start_frame) },
-            Hold::Left,
-        );
+        let stands = match trajectory.action {
+            Action::Open => last.max(clip.end_frame),
+            Action::Close => first.min(clip.start_frame),
+        };
+        if stands.abs_diff(end) > 4 * FREE {
+            after(end, Hold::Lost);
+        }
+        after(stands, Hold::Left);
     }
     frames
 }

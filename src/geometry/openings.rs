@@ -114,7 +114,7 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
         .collect();
     let mut shift = [0.0; 2];
     let mut shared = vec![0.0; offsets.iter().map(Vec::len).sum()];
-    let (e1, e2) = across(joint, face);
+    let (e1, e2) = hinge_directions(joint, face);
     let flat: Vec<&Seen> = seen.iter().flatten().collect();
     let mut scale = LOOSE_M;
     let mut fit = None;
@@ -163,8 +163,10 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
                 .map(|(s, offset)| {
                     let std = covariance[(index, index)].max(0.0).sqrt();
                     index += 2;
-                    // Half of what was not known before is more than the hand's own word.
-                    Opening { value: s.hand + offset, std, informed: std < 0.7 * s.std }
+                    // Depth at least halves the variance (0.7^2), or it told nothing. What is left then is the robust prior,
+                    // which is narrower at its top than the hand is sure.
+                    let informed = std < 0.7 * s.std;
+                    Opening { value: s.hand + offset, std: if informed { std } else { std.max(s.std) }, informed }
                 })
                 .collect()
         })
@@ -173,8 +175,8 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
     Some(Refit { joint, openings, across: [e1, e2], hinge_cov_m2, position_std_m })
 }
 
-/// Directions across a hinge: out of the front, and along it.
-fn across(joint: &Articulation, face: &Face) -> (Vector, Vector) {
+/// The two directions in which a fit moves a hinge: out of the front, and along it.
+fn hinge_directions(joint: &Articulation, face: &Face) -> (Vector, Vector) {
     let e1 = unit(&reject(&face.normal, &joint.axis)).unwrap_or_else(|| any_orthogonal(&joint.axis));
     (e1, joint.axis.cross(&e1))
 }

@@ -8,7 +8,7 @@ use nalgebra::Matrix3;
 
 use super::Face;
 use super::face::Rect;
-use super::moved::{GRAZING, Hold, View, tolerance};
+use super::moved::{GRAZING, Hold, NEAREST_M, View, tolerance};
 use crate::articulation::{Articulation, JointKind};
 use crate::math::{Point, Vector, rotation};
 
@@ -16,8 +16,6 @@ use crate::math::{Point, Vector, rotation};
 const RAYS: usize = 400;
 /// Rays that pass the part further away than this meet nothing of it, however it opens, metres beside its own size.
 const REACH_M: f64 = 0.6;
-/// A surface nearer to the eye than this is none, metres.
-const NEAREST_M: f64 = 0.15;
 /// Neighbouring rays and following views share their errors: all rays on a clip's part count as this many.
 const INDEPENDENT: f64 = 3.0;
 /// An outline is seldom exact, and not all of a part is seen to move.
@@ -100,7 +98,7 @@ fn surface(depth: f64, expected: f64) -> f64 {
 fn opened(depth: f64, front: f64) -> f64 {
     /// What furniture is deep, metres; beyond it, half as likely.
     const INSIDE_M: f64 = 1.0;
-    let free = (1.0 - BEFORE - BLOCKED) / INSIDE_M;
+    let free = (1.0 - BEFORE - BLOCKED) / (INSIDE_M + 0.5 * (ROOM_M - INSIDE_M));
     match depth - front {
         d if d < -tolerance(front) => BEFORE / front,
         d if d < tolerance(front) => BLOCKED / (2.0 * tolerance(front)),
@@ -191,6 +189,7 @@ impl Rays {
                 }
                 JointKind::Prismatic => (Matrix3::identity(), view.eye - axis * opening),
             };
+            // Out of the front within 26 degrees, as fitting tells drawers from sliding doors.
             let drawer = joint.kind == JointKind::Prismatic && axis.z > 0.9 && opening > 0.0;
             for ray in &view.rays {
                 let way = back * ray.way;

@@ -19,15 +19,17 @@ use crate::math::Point;
 /// four tiers best.
 const POINTS_WEIGHT: f64 = 0.75;
 const RAYS_WEIGHT: f64 = 0.5;
-/// Rays may not outvote a hand by more than this, nats: where an outline is wrong they are all wrong together.
+/// The rays' word before it is pooled, at most, nats: where an outline is wrong they are all wrong together.
 const MOST_NATS: f64 = 10.0;
-/// Between two offsets, metres: what the depth's tolerance bridges.
+/// Between two offsets, metres, at least: what the depth's tolerance bridges. The rays' offsets are half a standard deviation
+/// apart where that is more.
 const STEP_M: f64 = 0.02;
 
 /// Views whose offsets are one when joints are judged: what lets a wrong joint choose freely tells less.
 const TOGETHER: [&[Hold]; 3] = [&[Hold::Sure, Hold::Free], &[Hold::Lost], &[Hold::Left]];
 
-/// How well a joint explains the open views, in nats against that nothing moved.
+/// How well a joint explains the open views, in nats: the points' word is a right joint's against a wrong one's, the rays' is
+/// this joint's against that nothing moved. Only differences between joints mean something.
 ///
 /// Hands and depth disagree by a few centimetres that stay the same over a clip (a hand's distance is the least certain thing
 /// about it): the opening that the hand tells has an offset of its own, of which `grip_std_m` is the spread along the motion,
@@ -35,48 +37,53 @@ const TOGETHER: [&[Hold]; 3] = [&[Hold::Sure, Hold::Free], &[Hold::Lost], &[Hold
 #[must_use]
 pub fn agreement(sights: &Sights, joint: &Articulation, grip: &Point, grip_std_m: f64) -> f64 {
     POINTS_WEIGHT * log_likelihood(by_points(sights, joint, grip, grip_std_m))
-        + RAYS_WEIGHT * by_rays(&sights.rays, joint, grip, grip_std_m)
+        + RAYS_WEIGHT * by_rays(sights, joint, grip, grip_std_m)
+}
+
+/// Spread of the offset that views of these sorts share, metres: that of the surest sort that there is. Views after a hand let
+/// go are held to the offset of those before.
+fn spread_m(together: &[Hold], views: &[View], grip_std_m: f64) -> f64 {
+    let of = |h: &Hold| views.iter().any(|v| v.hold == *h).then(|| h.std_m(grip_std_m));
+    together.iter().filter_map(of).fold(f64::INFINITY, f64::min)
 }
 
 /// The rays' word: all offsets count, each as far as it is believed in.
-fn by_rays(rays: &Rays, joint: &Articulation, grip: &Point, grip_std_m: f64) -> f64 {
+fn by_rays(sights: &Sights, joint: &Articulation, grip: &Point, grip_std_m: f64) -> f64 {
     /// Offsets to each side, in standard deviations and at the most in number.
     const REACH: f64 = 2.5;
     const STEPS: f64 = 5.0;
     let lever = joint.lever(grip).max(0.05);
     // Where a hand was lost before it let go, the views after that have an offset of their own.
     let of = |holds: &[Hold]| -> f64 {
-        let std_m = holds.iter().map(|h| h.std_m(grip_std_m)).fold(f64::INFINITY, f64::min);
+        let std_m = spread_m(holds, sights.views, grip_std_m);
         let step = STEP_M.max(REACH * std_m / STEPS);
         let reach = (REACH * std_m / step).round() as i32;
         let terms: Vec<(f64, f64)> = (-reach..=reach)
             .map(|k| {
                 let offset = f64::from(k) * step;
                 let prior = (-0.5 * (offset / std_m).powi(2)).exp();
-                (prior, rays.log_likelihood(joint, grip, holds, offset / lever))
+                (prior, sights.rays.log_likelihood(joint, grip, holds, offset / lever))
             })
             .collect();
         let top = terms.iter().map(|(_, l)| *l).fold(f64::NEG_INFINITY, f64::max);
         let believed: f64 = terms.iter().map(|(prior, _)| prior).sum();
         top + (terms.iter().map(|(prior, l)| prior * (l - top).exp()).sum::<f64>() / believed).ln()
     };
-    let total: f64 = TOGETHER.into_iter().filter(|holds| rays.has(holds)).map(of).sum();
+    let total: f64 = TOGETHER.into_iter().filter(|holds| sights.rays.has(holds)).map(of).sum();
     MOST_NATS * (total / MOST_NATS).tanh()
 }
 
 /// The points' word: of the face's points that a joint moves clearly, the share that is seen where it puts them rather than seen
 /// through there, and no longer where they were; and the number of such sights.
 ///
-/// Hands and depth disagree by a few centimetres that stay the same over a clip (a hand's distance is the least certain thing
-/// about it): the opening that the hand tells is taken with an offset of its own, the one that explains most, less what so
-/// large an offset is believed in. `grip_std_m` is the spread of the offsets, metres.
+/// Of all offsets (see [`agreement`]) the one that explains most is taken, less what so large an offset is believed in.
 fn by_points(sights: &Sights, joint: &Articulation, grip: &Point, grip_std_m: f64) -> (f64, usize) {
-    /// Half a squared standard deviation against the log likelihood that the whole share is worth to the reasoner.
+    /// Half a squared standard deviation against what the whole share is worth in [`log_likelihood`].
     const SHARE_PER_NAT: f64 = 1.0 / 18.0;
     let lever = joint.lever(grip).max(0.05);
     // Where a hand was lost before it let go, the views after that have an offset of their own.
     let of = |holds: &[Hold]| -> (f64, usize) {
-        let std_m = holds.iter().map(|h| h.std_m(grip_std_m)).fold(f64::INFINITY, f64::min);
+        let std_m = spread_m(holds, sights.views, grip_std_m);
         let at = |offset: f64| -> (f64, usize) {
             let (share, count) = seen_share(sights, joint, grip, holds, offset / lever);
             ((share - SHARE_PER_NAT * 0.5 * (offset / std_m).powi(2)).max(0.0), count)
@@ -254,7 +261,7 @@ mod tests {
         for outline in [Some(&rect), None] {
             for (moves, opening) in &joints {
                 let found = joints.map(|(claims, _)| {
-                    ask(moves, *opening, *opening, outline, |s, grip| by_rays(&s.rays, &claims, grip, GRIP_STD_M))
+                    ask(moves, *opening, *opening, outline, |s, grip| by_rays(s, &claims, grip, GRIP_STD_M))
                 });
                 let best = (0..3).max_by(|&a, &b| found[a].total_cmp(&found[b])).unwrap();
                 assert!(joints[best].0 == *moves && found[best] > 1.0, "{outline:?} {moves:?} {found:?}");
@@ -266,8 +273,7 @@ mod tests {
     fn rays_tell_a_short_pull_from_a_slide_that_stays_in_the_front() {
         // Seven centimetres are less than depth at a metre needs to call a point moved.
         let (out, aside) = (slide(-Vector::y()), slide(-Vector::x()));
-        let of =
-            |claims: &Articulation| ask(&out, 0.07, 0.07, None, |s, grip| by_rays(&s.rays, claims, grip, GRIP_STD_M));
+        let of = |claims: &Articulation| ask(&out, 0.07, 0.07, None, |s, grip| by_rays(s, claims, grip, GRIP_STD_M));
         assert!(of(&out) > of(&aside) + 1.0, "{} {}", of(&out), of(&aside));
     }
 
@@ -275,8 +281,7 @@ mod tests {
     fn a_front_that_stayed_shut_speaks_against_all_motions() {
         for joint in [door(), slide(-Vector::y()), slide(-Vector::x())] {
             let told = if joint.kind == JointKind::Revolute { 0.9 } else { 0.3 };
-            let found =
-                ask(&joint, 0.0, told, Some(&drawn::rect()), |s, grip| by_rays(&s.rays, &joint, grip, GRIP_STD_M));
+            let found = ask(&joint, 0.0, told, Some(&drawn::rect()), |s, grip| by_rays(s, &joint, grip, GRIP_STD_M));
             // Most of what a slide within the front covers is covered by the front that stayed.
             let leaves = joint.axis.x.abs() < 0.5;
             assert!(found < if leaves { -1.0 } else { 0.0 }, "{joint:?} {found}");

@@ -158,12 +158,12 @@ pub(super) fn infer(
         result.candidates =
             result.candidates.iter().map(|c| candidates::settled(c, &paths, &config.reasoning)).collect();
     }
-    let seen_rays = result.face.as_ref().map(|face| sights::Sights::of(face, result.part.as_ref(), &open));
+    let sights_of_part = result.face.as_ref().map(|face| sights::Sights::of(face, result.part.as_ref(), &open));
     let grip_std_m = hands::grip_std_m(trajectory.closed_end_seen());
     let agreement: Vec<f64> = result
         .candidates
         .iter()
-        .map(|c| seen_rays.as_ref().map_or(0.0, |s| sights::agreement(s, &c.joint, &region.grip, grip_std_m)))
+        .map(|c| sights_of_part.as_ref().map_or(0.0, |s| sights::agreement(s, &c.joint, &region.grip, grip_std_m)))
         .collect();
     let answer = reasoner.answer(&Question {
         reading: &located.reading,

@@ -85,8 +85,8 @@ pub struct SceneJoint {
     pub observed_range: f64,
     /// Opening that each of `clips` went through, rad or m.
     pub moved: Vec<f64>,
-    /// How the part could move, its own joint first; one alone where nothing else has a hundredth of all weight, none where
-    /// nothing was weighed.
+    /// How the part could move, its own joint first; one alone where nothing else had a hundredth of all weight before
+    /// physics was asked, none where nothing was weighed.
     #[serde(default)]
     pub hypotheses: Vec<Hypothesis>,
 }

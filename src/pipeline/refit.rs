@@ -83,28 +83,30 @@ pub(super) fn refitted<'a>(
 fn open_end(joint: &Articulation, trajectory: &Trajectory, state: &OpenState, seen: &[Opening]) -> Opening {
     let told = moved::told(joint, &state.grip, state.views);
     let end = joint.opening_at(&state.grip, &trajectory.open_grip());
-    let mean = |of: &dyn Fn(usize) -> Option<f64>| -> Option<f64> {
-        let (mut sum, mut total) = (0.0, 0.0);
+    // The mean of what some views say, and the standard deviation of the surest of them: they share the hand's and the depth's
+    // errors, so together they are no surer.
+    let mean = |of: &dyn Fn(usize) -> Option<f64>| -> Option<(f64, f64)> {
+        let (mut sum, mut total, mut surest) = (0.0, 0.0, f64::INFINITY);
         for (i, opening) in seen.iter().enumerate() {
-            let weight = 1.0 / (opening.std * opening.std);
             if let Some(value) = of(i) {
+                let weight = opening.std.powi(-2);
                 sum += weight * value;
                 total += weight;
+                surest = surest.min(opening.std);
             }
         }
-        (total > 0.0).then(|| sum / total)
+        (total > 0.0).then(|| (sum / total, surest))
     };
     let of = |hold: Hold| mean(&|i| (state.views[i].hold == hold && seen[i].informed).then_some(seen[i].value));
     let after = of(Hold::Left).or(of(Hold::Lost)).or(of(Hold::Free));
     let during = mean(&|i| (state.views[i].hold == Hold::Sure && told[i] > 0.8 * end).then(|| seen[i].value - told[i]));
-    let value = after.or(during.map(|offset| end + offset)).unwrap_or(end);
-    // The views share the hand's and the depth's errors: together they are as sure as the surest of them. A hand that was lost
-    // and a part that nobody saw afterwards leave the end open.
-    let surest = seen.iter().map(|o| o.std).fold(f64::INFINITY, f64::min);
+    let any = seen.iter().map(|o| o.std).fold(f64::INFINITY, f64::min);
+    let (value, surest) = after.or(during.map(|(offset, std)| (end + offset, std))).unwrap_or((end, any));
+    // A hand that was lost and a part that nobody saw afterwards leave the end open.
     let lever = joint.lever(&state.grip).max(openings::LEAST_LEVER_M);
     let unseen = after.is_none() && !trajectory.open_end_seen();
     let std = if unseen { surest.hypot(hands::grip_std_m(false) / lever) } else { surest };
-    Opening { value, std, informed: !unseen }
+    Opening { value, std, informed: seen.iter().any(|o| o.informed) }
 }
 
 /// A part stays where it was left: the open end of a clip is where the next clip of the part finds it. Both clips' values
