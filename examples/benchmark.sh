@@ -6,6 +6,7 @@
 #   PAWS_SYNTH="--few-hands 3"  more options of `paws synth`: --hand-noise, --depth-bias, --word-error, --clips-per-part, ...
 #   PAWS_REPORT=FILE            the whole report as JSON, too
 #   PAWS_EVALUATE="--details"   more options of `paws evaluate`: groups, errors, part boxes, calibration
+# Inference asks physics about joints in doubt, as `paws twin` does (not under `paper`).
 # Images are deleted as soon as a kitchen is done: about 60 MB of disk at a time.
 set -euo pipefail
 tier=${1:?"a tier: t0 t1 t2 hd t3 short nonm"} first=${2:-1} count=${3:-20} config=${4:-ours}
@@ -29,7 +30,7 @@ for ((i = 0; i < count; i++)); do
   name=kitchen_$((first + i))
   "$paws" synth --seed $((first + i)) --tier "$tier" --parts 6 "${extra[@]}" --out "$name" >/dev/null
   status=0
-  "$paws" infer "$name" "${method[@]}" --out "$name.json" >/dev/null || status=$?
+  "$paws" infer "$name" --physics "${method[@]}" --out "$name.json" >/dev/null || status=$?
   # 1: no clip has an answer, which is a result.
   [ "$status" -le 1 ] || exit "$status"
   rm -rf "$name"/{frames,depth,masks,normals}
