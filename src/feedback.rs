@@ -15,8 +15,8 @@
 //! | an arm strains and it does not follow: its mass is assumed | 1/2 |
 //! | surer furniture leaves no place to build it | 1/2 |
 //!
-//! What is told by replays is the mean over the clips that could be replayed. Of all that speaks against a hypothesis the weightiest counts, times
-//! `validation.refuted_nats`. One round: every joint is judged among the others as they were before.
+//! What is told by replays is the mean over the clips that could be replayed. Of all that speaks against a hypothesis the
+//! weightiest counts, times `validation.refuted_nats`. One round: every joint is judged among the others as they were before.
 //!
 //! Of the room, floor and walls count. What else of it stands in the way may be this very part, seen where it was left open.
 
@@ -282,16 +282,7 @@ mod tests {
 
     fn hypothesis(joint: Articulation, share: f64, type_share: f64, moved: f64) -> Hypothesis {
         let part = Some(Rect { bounds: [[-0.5, 0.06], [-0.3, 0.1]] });
-        Hypothesis {
-            joint,
-            share,
-            type_share,
-            hinge_std_m: None,
-            uncertainty: None,
-            part,
-            moved: vec![moved],
-            refuted: None,
-        }
+        Hypothesis { joint, share, type_share, uncertainty: None, part, moved: vec![moved], refuted: None }
     }
 
     /// A front of 56 x 40 cm in the plane y = 0, seen from -y: a drawer, or a door hinged on the left at x = -0.3.
@@ -304,7 +295,6 @@ mod tests {
             furniture: None,
             type_probability: 0.6,
             joint_probability: 0.6,
-            hinge_std_m: None,
             uncertainty: None,
             grip: GRIP,
             face: Some(Face {

@@ -117,14 +117,19 @@ pub struct Predicted {
 pub fn predict(recording: &Recording, config: &Config, asked: Option<&Asked>) -> anyhow::Result<Predicted> {
     let steps = Steps::new();
     let model::Inferred { mut scene, usage, .. } = model::infer(recording, config, asked, &steps, false)?;
-    if config.validation.feedback {
-        steps.report("weighing", 0, 1);
-        scene.joints = crate::feedback::weighed(&scene, &recording.up(), config);
-    }
+    weigh(&mut scene, recording, config, &steps);
     let twin = crate::fitting::fit(&scene, &recording.up(), &config.fitting);
     steps.finish();
     let predictions = files::predictions(&scene, &twin);
     Ok(Predicted { scene, predictions, usage })
+}
+
+/// What physics says to a scene's joints, where the configuration asks for it.
+pub fn weigh(scene: &mut Scene, recording: &Recording, config: &Config, steps: &Steps) {
+    if config.validation.feedback {
+        steps.report("weighing", 0, 1);
+        scene.joints = crate::feedback::weighed(scene, &recording.up(), config);
+    }
 }
 
 fn bare_trajectories(paths: &[&PathBuf], config: &Config, out: Option<&Path>) -> anyhow::Result<Answer> {

@@ -20,7 +20,7 @@ use crate::report::table::aligned;
 use crate::report::{files, page, pictures, words};
 use crate::twin::Twin;
 use crate::validation::{self, Validation, Verdict, verdict::Hands};
-use crate::{export, feedback, fitting};
+use crate::{export, fitting};
 
 #[derive(Debug, Args)]
 pub struct TwinArgs {
@@ -122,10 +122,7 @@ pub fn make(
     let steps = Steps::new();
     let model::Inferred { mut scene, reasoner, usage, exchanges } =
         model::infer(&recording, config, asked, &steps, keep_steps)?;
-    if config.validation.feedback {
-        steps.report("weighing", 0, 1);
-        scene.joints = feedback::weighed(&scene, &recording.up(), config);
-    }
+    super::infer::weigh(&mut scene, &recording, config, &steps);
     steps.report("fitting boxes", 0, 1);
     let twin = fitting::fit(&scene, &recording.up(), &config.fitting);
     steps.report("simulating", 0, 1);

@@ -349,7 +349,6 @@ fn found(entry: &Entry, frame: &Frame, config: &config::Fitting) -> Result<Found
         face: Some(face),
         part: Some(rect),
         joint_probability: 1.0,
-        hinge_std_m: None,
         uncertainty: None,
         moved: Vec::new(),
         observed_range: upper,

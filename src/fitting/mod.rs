@@ -1,6 +1,7 @@
 //! From joints to boxes: the moving part around what was seen to move, its handle, the furniture behind it, how far it opens
 //! and what it resists with, and the room around it (ours).
 
+mod cells;
 pub mod joints;
 mod limits;
 pub mod overlap;
@@ -463,7 +464,6 @@ mod tests {
             furniture: None,
             type_probability: 1.0,
             joint_probability: 1.0,
-            hinge_std_m: None,
             uncertainty: None,
             grip: Point::new(0.2, -0.035, 0.8),
             face: Some(face),

@@ -46,8 +46,6 @@ pub struct Refit {
     pub across: [Vector; 2],
     /// Covariance of the hinge along `across`, m^2, by rows; none for slides.
     pub hinge_cov_m2: Option<[[f64; 2]; 2]>,
-    /// Standard deviation of the hinge across its axis in its least sure direction, metres; 0 for slides.
-    pub position_std_m: f64,
 }
 
 /// What is believed before the depth is looked at, and how well depth is measured.
@@ -145,13 +143,8 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
     if points < super::moved::MIN_POINTS {
         return None;
     }
-    let hinge = covariance.view((0, 0), (2, 2)).into_owned();
-    let rows: [[f64; 2]; 2] = std::array::from_fn(|row| std::array::from_fn(|column| hinge[(row, column)]));
+    let rows: [[f64; 2]; 2] = std::array::from_fn(|row| std::array::from_fn(|column| covariance[(row, column)]));
     let hinge_cov_m2 = (joint.kind == JointKind::Revolute).then_some(rows);
-    let position_std_m = match joint.kind {
-        JointKind::Prismatic => 0.0,
-        JointKind::Revolute => hinge.symmetric_eigen().eigenvalues.max().max(0.0).sqrt(),
-    };
     let mut index = 2;
     let openings = seen
         .iter()
@@ -172,7 +165,7 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
         })
         .collect();
     let joint = shifted(joint, &e1, &e2, shift);
-    Some(Refit { joint, openings, across: [e1, e2], hinge_cov_m2, position_std_m })
+    Some(Refit { joint, openings, across: [e1, e2], hinge_cov_m2 })
 }
 
 /// The two directions in which a fit moves a hinge: out of the front, and along it.
@@ -374,11 +367,10 @@ mod tests {
         assert!((found.value - 0.7).abs() < 0.03 && found.informed, "{found:?}");
         let off = door().line().distance(&fit.joint.origin);
         assert!(off < 0.012, "{off}");
-        assert!(fit.position_std_m < NOISE.hinge_m);
-        // The largest variance of the covariance is the standard deviation's; depth narrows both directions.
+        // Depth narrows both directions.
         let [[out, mixed], [_, along]] = fit.hinge_cov_m2.unwrap();
         let largest = 0.5 * (out + along) + (0.25 * (out - along).powi(2) + mixed * mixed).sqrt();
-        assert!((largest.sqrt() - fit.position_std_m).abs() < 1e-9 && out < PLANE_STD_M.powi(2), "{fit:?}");
+        assert!(largest < NOISE.hinge_m.powi(2) && out < PLANE_STD_M.powi(2), "{fit:?}");
         assert!((fit.across[0] + Vector::y()).norm() < 1e-9 && fit.across[1].z.abs() < 1e-9, "{fit:?}");
     }
 
@@ -388,7 +380,7 @@ mod tests {
         let fit = fitted(&drawer, 0.3, &drawer, 0.36, Point::new(0.2, -1.3, 0.5)).unwrap();
         let found = fit.openings[0][0];
         assert!((found.value - 0.3).abs() < 0.01 && found.informed, "{found:?}");
-        assert_eq!((fit.joint, fit.position_std_m, fit.hinge_cov_m2), (drawer, 0.0, None));
+        assert_eq!((fit.joint, fit.hinge_cov_m2), (drawer, None));
     }
 
     #[test]

@@ -28,6 +28,9 @@ const STEP_M: f64 = 0.02;
 /// Views whose offsets are one when joints are judged: what lets a wrong joint choose freely tells less.
 const TOGETHER: [&[Hold]; 3] = [&[Hold::Sure, Hold::Free], &[Hold::Lost], &[Hold::Left]];
 
+/// Hinges nearer to the hand are no candidates (`inference.min_radius_m`), metres.
+const LEAST_LEVER_M: f64 = 0.05;
+
 /// How well a joint explains the open views, in nats: the points' word is a right joint's against a wrong one's, the rays' is
 /// this joint's against that nothing moved. Only differences between joints mean something.
 ///
@@ -52,7 +55,7 @@ fn by_rays(sights: &Sights, joint: &Articulation, grip: &Point, grip_std_m: f64)
     /// Offsets to each side, in standard deviations and at the most in number.
     const REACH: f64 = 2.5;
     const STEPS: f64 = 5.0;
-    let lever = joint.lever(grip).max(0.05);
+    let lever = joint.lever(grip).max(LEAST_LEVER_M);
     // Where a hand was lost before it let go, the views after that have an offset of their own.
     let of = |holds: &[Hold]| -> f64 {
         let std_m = spread_m(holds, sights.views, grip_std_m);
@@ -80,7 +83,7 @@ fn by_rays(sights: &Sights, joint: &Articulation, grip: &Point, grip_std_m: f64)
 fn by_points(sights: &Sights, joint: &Articulation, grip: &Point, grip_std_m: f64) -> (f64, usize) {
     /// Half a squared standard deviation against what the whole share is worth in [`log_likelihood`].
     const SHARE_PER_NAT: f64 = 1.0 / 18.0;
-    let lever = joint.lever(grip).max(0.05);
+    let lever = joint.lever(grip).max(LEAST_LEVER_M);
     // Where a hand was lost before it let go, the views after that have an offset of their own.
     let of = |holds: &[Hold]| -> (f64, usize) {
         let std_m = spread_m(holds, sights.views, grip_std_m);

@@ -7,7 +7,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
-use super::glb::{Places, SHARES, Scene};
+use super::glb::Scene;
+use super::places::{animations, places, same_places};
 use super::sweep::sweep;
 use super::{Format, Kind, Link, MassSource, Model, ModelJoint, Shape, Tree};
 use crate::articulation::JointKind;
@@ -54,8 +55,6 @@ pub const POINTS: [(u8, &str); 9] = [
     (11, "sweep: no penetration over each range, a millimetre free when closed"),
 ];
 
-/// A handle must be in the same place in all files to within this, metres.
-const PLACE_M: f64 = 1e-5;
 /// Less is a hair, not a part.
 const MIN_MASS_KG: f64 = 0.05;
 /// More is a wall.
@@ -512,103 +511,6 @@ fn mjcf(model: &Model) -> Said {
                 "{}: its limits hang on autolimits, which PyBullet does not know; write limited=\"true\"",
                 joint.name
             ));
-        }
-    }
-    said
-}
-
-fn animations(scene: &Scene, twin: Option<&Twin>) -> Said {
-    let mut said = Said::about(true);
-    if !scene.required.is_empty() {
-        said.fault(format!("needs extensions that many readers do not have: {}", scene.required.join(", ")));
-    }
-    if scene.moved.is_empty() && twin.is_none() {
-        said.tell("nothing in it is animated".to_owned());
-    }
-    for moved in &scene.moved {
-        let name = &moved.name;
-        if !moved.is_pivot {
-            said.fault(format!(
-                "{name}: is animated and carries nothing; animate a node at the hinge with the part below it"
-            ));
-        }
-        if let Some(upper) = moved.upper
-            && (moved.reaches - upper).abs() > 1e-3
-        {
-            said.fault(format!("{name}: its animation opens to {:.4}, its limit is {upper:.4}", moved.reaches));
-        }
-    }
-    if scene.is_physics {
-        if let Some(moved) = scene.moved.first() {
-            said.fault(format!(
-                "{}: is animated, and animations override physics; keep them in another file",
-                moved.name
-            ));
-        }
-        return said;
-    }
-    for part in twin.iter().flat_map(|t| &t.furniture).map(|f| &f.part) {
-        match scene.moved.iter().find(|m| m.name == part.id) {
-            None => said.fault(format!("{}: has no animation", part.id)),
-            Some(m) if (m.reaches - part.joint.upper).abs() > 1e-3 => {
-                said.fault(format!(
-                    "{}: its animation opens to {:.4}, the model to {:.4}",
-                    part.id, m.reaches, part.joint.upper
-                ));
-            }
-            Some(_) => {}
-        }
-    }
-    said
-}
-
-/// Where links, named shapes and sites of each moving part are; every other joint is closed. World, metres.
-#[must_use]
-pub fn places(model: &Model, tree: &Tree) -> BTreeMap<String, Places> {
-    let closed = model.closed();
-    let mut out = BTreeMap::new();
-    for (index, joint) in model.moving() {
-        let beyond = tree.beyond(index);
-        let [shut, open] = joint.closed_and_open();
-        for (k, share) in SHARES.into_iter().enumerate() {
-            let mut positions = closed.clone();
-            positions[index] = shut + (open - shut) * share;
-            let poses = model.poses(tree, &positions);
-            for (i, link) in model.links.iter().enumerate().filter(|(i, _)| beyond[*i]) {
-                let shapes = link.shapes.iter().filter_map(|s| s.name.as_ref().map(|n| (n, s.bounds.center)));
-                let sites = link.sites.iter().map(|(n, p)| (n, *p));
-                for (name, p) in [(&link.name, math::Point::origin())].into_iter().chain(shapes).chain(sites) {
-                    out.entry(name.clone()).or_insert([math::Point::origin(); 3])[k] = poses[i] * p;
-                }
-            }
-        }
-    }
-    out
-}
-
-fn same_places(twin: &Twin, read: &BTreeMap<String, Places>) -> Said {
-    let mut said = Said::about(!twin.furniture.is_empty());
-    for part in twin.furniture.iter().map(|f| &f.part) {
-        let joint = &part.joint;
-        let handle = format!("{}_handle", part.id);
-        let solids = part.solids.iter().map(|s| (s.name.as_str(), s.shape.center));
-        let wanted = [(handle.as_str(), part.handle)].into_iter().chain(solids);
-        let (mut found, mut worst) = (false, (0.0f64, String::new()));
-        for (name, closed) in wanted {
-            let Some(have) = read.get(name) else { continue };
-            found = true;
-            for (share, p) in SHARES.into_iter().zip(have) {
-                let off = (joint.articulation.motion(share * joint.upper) * closed - p).norm();
-                // What is not a number is off too.
-                if off > worst.0 || off.is_nan() {
-                    worst = (off, format!("{name} at {share} of its range"));
-                }
-            }
-        }
-        if !found {
-            said.fault(format!("{}: neither its handle nor any of its boxes is in the file", part.id));
-        } else if worst.0 > PLACE_M || worst.0.is_nan() {
-            said.fault(format!("{}: {} is {:.3} mm off", part.id, worst.1, 1000.0 * worst.0));
         }
     }
     said

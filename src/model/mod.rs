@@ -10,6 +10,7 @@ pub mod glb;
 mod mesh;
 pub mod mjcf;
 mod mjcf_context;
+mod places;
 mod shapes;
 mod sweep;
 pub mod urdf;

@@ -100,17 +100,10 @@ pub(super) fn infer(
     config: &Config,
 ) -> Result<ClipResult> {
     let mut result = ClipResult {
-        clip: clip.clone(),
         trajectory: located.trajectory,
         region: located.region,
         views: located.views,
-        lines: Vec::new(),
-        face: None,
-        part: None,
-        words: None,
-        candidates: Vec::new(),
-        answer: None,
-        joint: Outcome::Abstained(located.reason.unwrap_or_default()),
+        ..ClipResult::unanswered(clip.clone(), located.reason.unwrap_or_default())
     };
     let (Some(trajectory), Some(region)) = (&result.trajectory, &result.region) else { return Ok(result) };
 

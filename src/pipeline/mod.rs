@@ -54,6 +54,25 @@ pub struct ClipResult {
     pub joint: Outcome<ClipJoint>,
 }
 
+impl ClipResult {
+    /// A clip of which nothing is known, and why.
+    pub(crate) fn unanswered(clip: Clip, reason: String) -> Self {
+        Self {
+            clip,
+            trajectory: None,
+            region: None,
+            views: Vec::new(),
+            lines: Vec::new(),
+            face: None,
+            part: None,
+            words: None,
+            candidates: Vec::new(),
+            answer: None,
+            joint: Outcome::Abstained(reason),
+        }
+    }
+}
+
 /// One joint of the scene with all that the later steps need to know about it.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SceneJoint {
@@ -69,9 +88,6 @@ pub struct SceneJoint {
     pub type_probability: f64,
     /// Probability of type and axis.
     pub joint_probability: f64,
-    /// Standard deviation of a hinge across its axis in its least sure direction, metres; `None` for slides and where the
-    /// open state was not seen.
-    pub hinge_std_m: Option<f64>,
     /// How sure axis, hinge and openings are; `None` for joints that nobody was seen to move.
     #[serde(default)]
     pub uncertainty: Option<Uncertainty>,
@@ -86,7 +102,7 @@ pub struct SceneJoint {
     /// Opening that each of `clips` went through, rad or m.
     pub moved: Vec<f64>,
     /// How the part could move, its own joint first; one alone where nothing else had a hundredth of all weight before
-    /// physics was asked, none where nothing was weighed.
+    /// physics was asked, or where it is not to be asked (`validation.feedback`).
     #[serde(default)]
     pub hypotheses: Vec<Hypothesis>,
 }
@@ -101,8 +117,6 @@ pub struct Hypothesis {
     pub share: f64,
     /// Probability of its type, not tempered.
     pub type_share: f64,
-    /// As [`SceneJoint::hinge_std_m`].
-    pub hinge_std_m: Option<f64>,
     /// As [`SceneJoint::uncertainty`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<Uncertainty>,
@@ -121,7 +135,6 @@ impl SceneJoint {
     pub fn under(&self, hypothesis: &Hypothesis) -> Self {
         Self {
             joint: hypothesis.joint,
-            hinge_std_m: hypothesis.hinge_std_m,
             uncertainty: hypothesis.uncertainty.clone(),
             part: hypothesis.part,
             observed_range: hypothesis.moved.iter().copied().fold(0.0, f64::max),

@@ -19,7 +19,6 @@ pub(super) struct Refitted<'a> {
     /// All clips' views of the open state, and the opening in each.
     pub(super) views: Vec<moved::View<'a>>,
     pub(super) openings: Vec<f64>,
-    pub(super) position_std_m: f64,
     /// Opening that each clip went through, rad or m.
     pub(super) ranges: Vec<f64>,
     /// How sure hinge and ranges are.
@@ -68,14 +67,7 @@ pub(super) fn refitted<'a>(
     };
     let openings = fit.openings.iter().flatten().map(|o| o.value).collect();
     let views = views.into_iter().flatten().collect();
-    Some(Refitted {
-        joint: fit.joint,
-        views,
-        openings,
-        position_std_m: shared.sqrt() * fit.position_std_m,
-        ranges,
-        depth,
-    })
+    Some(Refitted { joint: fit.joint, views, openings, ranges, depth })
 }
 
 /// Opening at the open end of a clip. After the hand let go the part stands there: what those views show counts, else what is
@@ -134,26 +126,14 @@ fn left_where_found(shown: &[(&ClipResult, &Trajectory)], ends: &[Opening]) -> V
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::articulation::Outcome;
     use crate::hands::Sample;
     use crate::math::Point;
     use crate::recording::Clip;
 
     fn clip(start_frame: usize) -> ClipResult {
         let [clip, narration, verb, noun] = [(); 4].map(|()| String::new());
-        ClipResult {
-            clip: Clip { clip, start_frame, end_frame: start_frame + 9, narration, verb, noun },
-            trajectory: None,
-            region: None,
-            views: Vec::new(),
-            lines: Vec::new(),
-            face: None,
-            part: None,
-            words: None,
-            candidates: Vec::new(),
-            answer: None,
-            joint: Outcome::Abstained(String::new()),
-        }
+        let clip = Clip { clip, start_frame, end_frame: start_frame + 9, narration, verb, noun };
+        ClipResult::unanswered(clip, String::new())
     }
 
     fn hand(action: Action) -> Trajectory {

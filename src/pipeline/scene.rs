@@ -50,8 +50,10 @@ pub(super) fn merge(
         .map(|g| g.into_iter().map(|i| seen[i].0).collect::<Vec<usize>>())
         .filter(|g| g.iter().any(|&c| clips[c].joint.found().is_some()))
         .collect();
-    let merged: Vec<Option<SceneJoint>> =
-        groups.par_iter().map(|g| merge_group(recording, sketches, clips, g, reasoner, config)).collect();
+    let merged: Vec<Option<SceneJoint>> = groups
+        .par_iter()
+        .map(|members| merge_group(&Group { recording, sketches, clips, members, config }, reasoner))
+        .collect();
     let mut joints: Vec<SceneJoint> = merged.into_iter().flatten().collect();
     for (i, joint) in joints.iter_mut().enumerate() {
         joint.id = format!("joint_{i}");
@@ -134,31 +136,46 @@ fn likely(candidates: &[AxisCandidate], answer: &Answer, merged: bool) -> Vec<Li
         .collect()
 }
 
+/// Clips of one part, and what they are judged with.
+#[derive(Clone, Copy)]
+struct Group<'a> {
+    recording: &'a Recording,
+    sketches: &'a BTreeMap<usize, Sketch>,
+    clips: &'a [ClipResult],
+    /// Indices into `clips`.
+    members: &'a [usize],
+    config: &'a Config,
+}
+
+impl<'a> Group<'a> {
+    /// The clips in which a hand was followed.
+    fn shown(&self) -> Vec<(&'a ClipResult, &'a Trajectory)> {
+        let clips = self.members.iter().map(|&c| &self.clips[c]);
+        clips.filter_map(|clip| Some((clip, clip.trajectory.as_ref()?))).collect()
+    }
+}
+
 /// One part's joint, and how else it could move.
-fn merge_group(
-    recording: &Recording,
-    sketches: &BTreeMap<usize, Sketch>,
-    clips: &[ClipResult],
-    group: &[usize],
-    reasoner: &dyn Reasoner,
-    config: &Config,
-) -> Option<SceneJoint> {
-    let judged = judged(recording, sketches, clips, group, reasoner, config)?;
+fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
+    let judged = judged(group, reasoner)?;
+    let Group { clips, members, config, .. } = *group;
+    // What physics will not be asked about is not built.
+    let asked = if config.validation.feedback { judged.likely.len() } else { 1 };
+    let around = around(group, judged.best);
     let hypotheses: Vec<Hypothesis> =
-        judged.likely.iter().map(|l| built(recording, sketches, clips, group, &judged, l, config)).collect();
+        judged.likely.iter().take(asked).map(|l| built(group, &judged, l, &around)).collect();
     let answer = hypotheses.first()?.clone();
     Some(SceneJoint {
         id: String::new(),
         joint: answer.joint,
-        clips: group.iter().map(|&c| clips[c].clip.clip.clone()).collect(),
+        clips: members.iter().map(|&c| clips[c].clip.clip.clone()).collect(),
         // Where people said "it", a model may have seen what it was.
-        furniture: group
+        furniture: members
             .iter()
             .find_map(|&c| narration::read(&clips[c].clip).furniture)
-            .or_else(|| group.iter().find_map(|&c| clips[c].words.as_ref()?.furniture.clone())),
+            .or_else(|| members.iter().find_map(|&c| clips[c].words.as_ref()?.furniture.clone())),
         type_probability: judged.type_probability,
         joint_probability: judged.joint_probability,
-        hinge_std_m: answer.hinge_std_m,
         uncertainty: answer.uncertainty,
         grip: judged.grip,
         face: clips[judged.best].face,
@@ -170,14 +187,8 @@ fn merge_group(
 }
 
 /// All candidates of all clips of one part, judged on every clip: the best explains all of them.
-fn judged(
-    recording: &Recording,
-    sketches: &BTreeMap<usize, Sketch>,
-    clips: &[ClipResult],
-    group: &[usize],
-    reasoner: &dyn Reasoner,
-    config: &Config,
-) -> Option<Judged> {
+fn judged(group: &Group, reasoner: &dyn Reasoner) -> Option<Judged> {
+    let Group { recording, sketches, clips, members, config } = *group;
     // The clip that saw the closed part best gives the face, the grip and the part's outline.
     let trust = |c: usize| -> f64 {
         let clip = &clips[c];
@@ -186,7 +197,7 @@ fn judged(
         let held = (-0.5 * ((standoff - config.geometry.grip_standoff_m) / 0.05).powi(2)).exp();
         held * (0.2 + face.support) * if clip.part.is_some() { 2.0 } else { 1.0 }
     };
-    let &best = group
+    let &best = members
         .iter()
         .filter(|&&c| clips[c].joint.found().is_some())
         .max_by(|&&a, &&b| trust(a).total_cmp(&trust(b)).then(b.cmp(&a)))?;
@@ -196,20 +207,20 @@ fn judged(
     let (mut joint, mut type_probability) = (best_joint.joint, best_joint.type_probability);
     let mut joint_probability = best_joint.joint_probability;
     let mut all_likely = Vec::new();
-    if group.len() > 1 && config.inference.method == InferenceMethod::Paper {
+    if members.len() > 1 && config.inference.method == InferenceMethod::Paper {
         // The clips' own joints, one voice each.
         let all: Vec<(Articulation, f64)> =
-            group.iter().filter_map(|&c| clips[c].joint.found()).map(|j| (j.joint, 1.0)).collect();
+            members.iter().filter_map(|&c| clips[c].joint.found()).map(|j| (j.joint, 1.0)).collect();
         joint = aggregate::consensus(&joint, &all);
-    } else if group.len() > 1 {
+    } else if members.len() > 1 {
         let paths: Vec<Vec<Point>> =
-            group.iter().filter_map(|&c| clips[c].trajectory.as_ref()).map(Trajectory::positions).collect();
-        let pooled: Vec<AxisCandidate> = pooled(clips, group, best, &grip, &config.inference)
+            members.iter().filter_map(|&c| clips[c].trajectory.as_ref()).map(Trajectory::positions).collect();
+        let pooled: Vec<AxisCandidate> = pooled(clips, members, best, &grip, &config.inference)
             .iter()
             .map(|c| candidates::settled(c, &paths, &config.reasoning))
             .collect();
         let mut answers = Vec::new();
-        for &c in group {
+        for &c in members {
             let Some(trajectory) = &clips[c].trajectory else { continue };
             let open = moved::open_views(recording, sketches, &clips[c].clip, trajectory);
             let path = trajectory.positions();
@@ -283,22 +294,31 @@ fn judged(
     Some(Judged { best, grip, likely: all_likely, type_probability, joint_probability })
 }
 
+/// What a part's outline is told from, beside its joint.
+struct Around {
+    /// Points of the furniture, world.
+    surface: Vec<Point>,
+    /// As [`outline::CellVotes::moving_rect`] takes them.
+    stops: Vec<(usize, f64, [f64; 2])>,
+}
+
+/// Of the clip that saw the closed part best.
+fn around(group: &Group, best: usize) -> Around {
+    let (clip, reach_m) = (&group.clips[best], group.config.localization.reach_m);
+    let surface = clip
+        .region
+        .as_ref()
+        .map_or_else(Vec::new, |region| clip::surface(group.recording, region, &clip.views, group.sketches, reach_m));
+    Around { surface, stops: clip.face.as_ref().map_or_else(Vec::new, |face| clip::edges_on(face, &clip.lines)) }
+}
+
 /// A part under one of its joints: which way it opens, then hinge, openings and outline from the depth of the open state.
-fn built(
-    recording: &Recording,
-    sketches: &BTreeMap<usize, Sketch>,
-    clips: &[ClipResult],
-    group: &[usize],
-    judged: &Judged,
-    likely: &Likely,
-    config: &Config,
-) -> Hypothesis {
+fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around) -> Hypothesis {
+    let Group { recording, sketches, clips, config, .. } = *group;
     let (best, face) = (judged.best, clips[judged.best].face);
-    let trajectories = || group.iter().filter_map(|&c| clips[c].trajectory.as_ref());
-    let mut joint = inference::opening_sense(likely.joint, face.as_ref(), &judged.grip, trajectories());
-    let shown: Vec<(&ClipResult, &Trajectory)> =
-        group.iter().filter_map(|&c| Some((&clips[c], clips[c].trajectory.as_ref()?))).collect();
-    let mut hinge_std_m = None;
+    let shown = group.shown();
+    let trajectories = shown.iter().map(|(_, t)| *t);
+    let mut joint = inference::opening_sense(likely.joint, face.as_ref(), &judged.grip, trajectories);
     let mut depth = None;
     let mut part = clips[best].part;
     let mut moved: Vec<f64> =
@@ -308,17 +328,13 @@ fn built(
         && let Some(fit) = refit::refitted(recording, sketches, &shown, &joint, &face, &rect, config)
     {
         joint = fit.joint;
-        hinge_std_m = (joint.kind == JointKind::Revolute).then_some(fit.position_std_m);
         moved = fit.ranges;
         depth = Some(fit.depth);
         // With the openings known better the part's outline is, too.
-        if let Some(region) = &clips[best].region {
-            let reach = config.localization.reach_m;
-            let surface = clip::surface(recording, region, &clips[best].views, sketches, reach);
-            let stops = clip::edges_on(&face, &clips[best].lines);
-            let votes = outline::vote(&face, &surface, &fit.views, Some((&joint, &fit.openings)), &config.fitting);
-            part = votes.moving_rect(&stops).or(part);
-        }
+        let seen = Some((&joint, fit.openings.as_slice()));
+        part = outline::vote(&face, &around.surface, &fit.views, seen, &config.fitting)
+            .moving_rect(&around.stops)
+            .or(part);
     }
     let evidence = uncertainty::Evidence {
         joint: &joint,
@@ -330,14 +346,5 @@ fn built(
         depth: depth.as_ref(),
     };
     let uncertainty = uncertainty::of(&evidence, &config.reasoning);
-    Hypothesis {
-        joint,
-        share: likely.share,
-        type_share: likely.type_share,
-        hinge_std_m,
-        uncertainty,
-        part,
-        moved,
-        refuted: None,
-    }
+    Hypothesis { joint, share: likely.share, type_share: likely.type_share, uncertainty, part, moved, refuted: None }
 }
