@@ -106,6 +106,8 @@ block! {
         restart_after: usize = 3, "samples", "ours";
         /// Use the detector's contact flags; false takes every sample of a clip.
         use_contact: bool = true, "-", "A.2";
+        /// Where no sample is flagged, all of the clip count if the narration names the furniture that they move.
+        contact_from_words: bool = true, "-", "ours";
         /// Contact that begins inside a narration is followed beyond its bounds by at most this (0 = not at all).
         widen_secs: f64 = 2.0, "s", "ours";
         /// Fewer samples in contact than this give no answer.
@@ -194,11 +196,13 @@ block! {
         /// How often a language model tells the motion type rightly.
         vlm_accuracy: f64 = 0.9, "share", "ours";
         /// How often the furniture's name tells the motion type rightly.
-        name_accuracy: f64 = 0.9, "share", "ours";
+        name_accuracy: f64 = 0.95, "share", "ours";
         /// Independent samples in one recorded motion: errors of neighbouring frames are correlated.
         effective_samples: f64 = 8.0, "-", "ours";
         /// Noise of a smoothed hand position when two explanations of it are compared.
         hand_std_m: f64 = 0.03, "m", "ours";
+        /// Log likelihoods of hand and depth are divided by this before they meet priors and words: they share errors.
+        evidence_temperature: f64 = 2.0, "-", "ours";
     }
 }
 
@@ -226,8 +230,8 @@ block! {
         use_face_normal: bool = true, "-", "ours";
         /// Hinge directions within this angle of an axis of the face are set to it.
         snap_deg: f64 = 12.0, "deg", "ours";
-        /// Log odds of reported probabilities are divided by this; chosen on the development seeds of all tiers.
-        temperature: f64 = 3.0, "-", "ours";
+        /// Covariances of what is fitted to the depth of the open state are multiplied by this: its views share errors.
+        shared_errors: f64 = 3.0, "-", "ours";
         /// Fit the hinge and the openings to the depth of the open state.
         refit: bool = true, "-", "ours";
         /// Merge clips of one joint into one scene-level joint.
@@ -362,6 +366,7 @@ impl Config {
     #[must_use]
     pub fn paper() -> Self {
         let mut config = Self { method: Method::Paper, ..Self::default() };
+        config.hands.contact_from_words = false;
         config.hands.restart_after = 0;
         config.hands.min_samples = 3;
         config.hands.widen_secs = 0.0;

@@ -28,7 +28,7 @@ use crate::fitting;
 use crate::geometry::Face;
 use crate::geometry::candidates::{IN_FACE, outwardness};
 use crate::hands::Trajectory;
-use crate::inference::{observed_range, tempered};
+use crate::inference::observed_range;
 use crate::math::{Point, Vector};
 use crate::pipeline::{Hypothesis, Scene, SceneJoint};
 use crate::twin::{Part, Solid, Twin};
@@ -230,10 +230,9 @@ fn rechosen(joint: &SceneJoint, against: &[Option<Refutation>], config: &Config)
     };
     hypotheses[..=chosen].rotate_right(1);
     let answer = hypotheses[0].clone();
-    let temperature = config.inference.temperature;
     SceneJoint {
-        type_probability: tempered(answer.type_share, temperature),
-        joint_probability: tempered(answer.share, temperature),
+        type_probability: answer.type_share,
+        joint_probability: answer.share,
         hypotheses,
         ..joint.under(&answer)
     }
@@ -406,7 +405,7 @@ mod tests {
         assert!((drawer.type_share + door.type_share - 1.0).abs() < 1e-12);
         assert!(((drawer.type_share - drawer.share) / drawer.share - 0.005 / 0.6).abs() < 1e-12);
         assert_eq!((after.joint, door.refuted.as_deref()), (DRAWER, Some("so")));
-        assert_eq!(after.type_probability, tempered(drawer.type_share, config.inference.temperature));
+        assert_eq!(after.type_probability, drawer.type_share);
         assert!(after.type_probability > 0.6 && after.joint_probability < after.type_probability);
     }
 

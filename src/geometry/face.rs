@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::LineTrack;
 use super::manhattan::ManhattanFrame;
 use crate::config;
 use crate::math::plane::Plane;
@@ -77,8 +78,12 @@ pub struct Surroundings<'a> {
     pub viewpoint: Point,
     /// The room's frame.
     pub manhattan: Option<&'a ManhattanFrame>,
+    /// 3D lines at the furniture.
+    pub lines: &'a [LineTrack],
     /// The world's up direction.
     pub up: Vector,
+    /// Share of such furniture whose moving face is level, a lid; one half where nothing is known.
+    pub level: f64,
 }
 
 /// Fits the face that the grip stands off, oriented to the viewpoint. `None` where no plane is near the grip.
@@ -143,7 +148,7 @@ pub fn fit(around: &Surroundings, config: &config::Geometry, seed: u64) -> Optio
         return None;
     }
     let normal = plane.normal;
-    let up = face_up(&normal, &around.up, &(around.viewpoint - grip));
+    let up = face_up(&plane, around);
     let right = up.cross(&normal);
     let mut face = Face { center: plane.project(&grip), right, up, normal, extent: [[0.0; 2]; 2], support };
     let on_face: Vec<[f64; 3]> = around
@@ -197,13 +202,61 @@ fn face_prior(plane: &Plane, around: &Surroundings, config: &config::Geometry) -
         d if d < 8.0 => 0.9,
         _ => 0.7,
     };
-    held * leaves * seen * upright * in_room
+    let named = if tilt > 0.7 { around.level } else { 1.0 - around.level };
+    held * leaves * seen * upright * in_room * named
 }
 
-/// Up within the face; on a lid, away from the person.
-fn face_up(normal: &Vector, world_up: &Vector, towards_person: &Vector) -> Vector {
-    let reference = if normal.dot(world_up).abs() > 0.7 { -towards_person } else { *world_up };
-    unit(&reject(&reference, normal)).unwrap_or_else(|| any_orthogonal(normal))
+/// Up within the face; on a lid, away from the person along the furniture's own edges.
+fn face_up(plane: &Plane, around: &Surroundings) -> Vector {
+    let normal = plane.normal;
+    if normal.dot(&around.up).abs() <= 0.7 {
+        return unit(&reject(&around.up, &normal)).unwrap_or_else(|| any_orthogonal(&normal));
+    }
+    let away = reject(&(around.grips[0] - around.viewpoint), &normal);
+    let ahead = |d: Vector| if d.dot(&away) < 0.0 { -d } else { d };
+    let Some(d) = level_direction(plane, around) else { return unit(&away).unwrap_or_else(|| any_orthogonal(&normal)) };
+    let [d, across] = [ahead(d), ahead(normal.cross(&d))];
+    if d.dot(&away) >= across.dot(&away) { d } else { across }
+}
+
+/// One of the two directions in which a level face's edges run: that of most of the lines on it, the room's walls counting as
+/// one more.
+fn level_direction(plane: &Plane, around: &Surroundings) -> Option<Vector> {
+    /// Lines on the face, metres from its plane.
+    const NEAR_M: f64 = 0.05;
+    /// Spread of the directions of lines of one edge, radians.
+    const SPREAD: f64 = 0.05;
+    /// The room's own weight: a lid has two edges of half a metre that can be seen well, or none.
+    const WALLS_M: f64 = 1.0;
+    let normal = plane.normal;
+    let on_face = around.lines.iter().filter(|line| {
+        let middle = line.segment.middle();
+        plane.height(&middle).abs() <= NEAR_M
+            && (middle - around.grips[0]).norm() <= 2.0 * NEIGHBOURHOOD_M
+            && line.segment.line.direction.dot(&normal).abs() < 0.2
+    });
+    let walls = around.manhattan.iter().flat_map(|m| m.axes).filter(|a| a.dot(&normal).abs() < 0.5);
+    let directions: Vec<(Vector, f64)> = on_face
+        .map(|line| (line.segment.line.direction, line.segment.length()))
+        .chain(walls.take(1).map(|a| (a, WALLS_M)))
+        .filter_map(|(d, weight)| Some((unit(&reject(&d, &normal))?, weight)))
+        .collect();
+    // Edges of furniture are square to each other: of the sine of twice the angle only square and parallel ones have none.
+    let off = |a: &Vector, b: &Vector| {
+        let (sine, cosine) = (a.cross(b).dot(&normal), a.dot(b));
+        0.25 * (4.0 * sine.atan2(cosine)).sin().atan2((4.0 * sine.atan2(cosine)).cos())
+    };
+    let support = |d: &Vector| -> f64 {
+        directions.iter().map(|(other, weight)| weight * (-0.5 * (off(d, other) / SPREAD).powi(2)).exp()).sum()
+    };
+    let (best, _) = directions
+        .iter()
+        .map(|(d, _)| (*d, support(d)))
+        .reduce(|best, next| if next.1 > best.1 { next } else { best })?;
+    // The mean of those that agree.
+    let agreeing = directions.iter().map(|(d, w)| (off(&best, d), *w)).filter(|(a, _)| a.abs() <= 2.0 * SPREAD);
+    let (sum, total) = agreeing.fold((0.0, 0.0), |(sum, total), (a, w)| (sum + a * w, total + w));
+    Some(crate::math::rotation(&normal, sum / total) * best)
 }
 
 /// Middle of the densest window of a sorted list.
@@ -243,11 +296,54 @@ mod tests {
             viewpoint: Point::new(0.2, -0.8, 1.6),
             manhattan: None,
             up: Vector::z(),
+            level: 0.5,
+            lines: &[],
         };
         let face = fit(&around, &config::Geometry::default(), 0).unwrap();
         assert!((face.normal + Vector::y()).norm() < 1e-6, "{face:?}");
         assert!((face.right - Vector::x()).norm() < 1e-6 && (face.up - Vector::z()).norm() < 1e-6);
         assert!((face.coordinates(&Point::new(0.05, -0.035, 0.7))[2] - 0.035).abs() < 1e-9);
         assert!((face.extent[0][0] + 0.45).abs() < 0.03 && (face.extent[1][1] - 0.1).abs() < 0.05, "{face:?}");
+    }
+
+    #[test]
+    fn a_lid_lies_as_its_edges_do_and_not_as_the_person_stands() {
+        let edge = |angle: f64, at: Point| {
+            let d = Vector::new(angle.cos(), angle.sin(), 0.0);
+            LineTrack {
+                segment: crate::math::line::Segment::between(&(at - 0.2 * d), &(at + 0.2 * d)).unwrap(),
+                views: vec![0, 1, 2],
+                rms_m: 0.002,
+                position_covariance: nalgebra::Matrix3::zeros(),
+                direction_covariance: nalgebra::Matrix3::zeros(),
+            }
+        };
+        let room = ManhattanFrame { axes: [Vector::x(), Vector::y(), Vector::z()], frames: 5 };
+        let plane = Plane { normal: Vector::z(), offset: 0.5 };
+        // Two edges of a lid that is turned by 20 degrees, one of something else, one far below.
+        let lines = [
+            edge(0.349, Point::new(0.0, 0.0, 0.5)),
+            edge(0.349 + std::f64::consts::FRAC_PI_2, Point::new(0.2, 0.2, 0.51)),
+            edge(0.349, Point::new(0.0, 0.4, 0.5)),
+            edge(1.0, Point::new(0.1, 0.1, 0.5)),
+            edge(1.0, Point::new(0.1, 0.1, 0.1)),
+        ];
+        let up = |lines: &[LineTrack], manhattan| {
+            let grip = Point::new(0.0, 0.0, 0.53);
+            let around = Surroundings {
+                surface: &[],
+                grips: [grip, grip],
+                viewpoint: Point::new(0.25, -0.8, 1.6),
+                manhattan,
+                lines,
+                up: Vector::z(),
+                level: 0.5,
+            };
+            face_up(&plane, &around)
+        };
+        let turned = Vector::new(-(0.349f64.sin()), 0.349f64.cos(), 0.0);
+        assert!((up(&lines, Some(&room)) - turned).norm() < 0.01, "{}", up(&lines, Some(&room)));
+        assert!((up(&[], Some(&room)) - Vector::y()).norm() < 1e-9);
+        assert!(crate::math::unsigned_angle(&up(&[], None), &Vector::new(-0.25, 0.8, 0.0).normalize()) < 1e-6);
     }
 }

@@ -43,15 +43,15 @@ pub struct ClipJoint {
     pub action: Action,
 }
 
-/// Applies the rules of §A.7 to the candidates under the reasoner's weights. `seen_to_move`: depth shows that a part moved, so
-/// that a hand that was seen for a moment only is enough.
+/// Applies the rules of §A.7 to the candidates under the reasoner's weights. `vouched_for`: depth shows that a part moved, or
+/// the touched furniture is known by name, so that a hand that was seen for a moment only is enough.
 #[must_use]
 pub fn infer(
     trajectory: &Trajectory,
     candidates: &[AxisCandidate],
     answer: &Answer,
     face: Option<&Face>,
-    seen_to_move: bool,
+    vouched_for: bool,
     reasoning: &config::Reasoning,
     config: &config::Inference,
 ) -> Outcome<ClipJoint> {
@@ -59,7 +59,7 @@ pub fn infer(
     const MIN_EXTENT_M: f64 = 0.03;
     let positions = trajectory.positions();
     let extent = positions.iter().map(|p| (p - positions[0]).norm()).fold(0.0, f64::max);
-    if extent < MIN_EXTENT_M && !seen_to_move {
+    if extent < MIN_EXTENT_M && !vouched_for {
         return Outcome::Abstained(format!("the hand in contact moved by only {:.1} cm", 100.0 * extent));
     }
     let revolute_probability = answer.revolute_probability(candidates);
@@ -96,7 +96,7 @@ pub fn infer(
             let Some(fit) = path::along(&path, &joint.axis, tolerance) else {
                 return Outcome::Abstained("no hand samples".to_owned());
             };
-            if fit.inliers < config.prismatic_min_inliers && !seen_to_move {
+            if fit.inliers < config.prismatic_min_inliers && !vouched_for {
                 return Outcome::Abstained(format!(
                     "only {:.0} % of the hand samples lie on any slide ({:.0} % are needed)",
                     100.0 * fit.inliers,
@@ -117,8 +117,8 @@ pub fn infer(
         joint,
         contact_pivot,
         source: best.source,
-        type_probability: tempered(type_probability, config.temperature),
-        joint_probability: tempered(type_probability * agreeing_share(&best.joint, &all), config.temperature),
+        type_probability,
+        joint_probability: type_probability * agreeing_share(&best.joint, &all),
         residual_m: residual,
         inliers,
         radius_m,
@@ -164,22 +164,14 @@ pub fn opening_sense<'a>(
     if opened < 0.0 { joint.reversed() } else { joint }
 }
 
-/// A probability with its log odds divided by `temperature`: pieces of evidence that share a hand, a depth estimate or a
-/// view count as independent where weights are multiplied, and are not.
-#[must_use]
-pub fn tempered(probability: f64, temperature: f64) -> f64 {
-    let p = probability.clamp(1e-12, 1.0 - 1e-12);
-    1.0 / (1.0 + (-(p / (1.0 - p)).ln() / temperature).exp())
-}
-
 /// One way to explain a motion: candidates that are the same joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Explanation {
     /// Indices of the candidates, the likeliest first; never empty.
     pub members: Vec<usize>,
-    /// Probability of its type, not tempered.
+    /// Probability of its type.
     pub type_share: f64,
-    /// Probability of its type and axis, not tempered.
+    /// Probability of its type and axis.
     pub share: f64,
 }
 

@@ -11,7 +11,7 @@
 //! - Any other hinge: the prior of its source times what the hands' arcs say of their centre, the radius free: a Laplace
 //!   approximation again, the same Fisher information.
 //! - An opening whose open state was seen: the same fit, all else integrated out; of a part that was found as it was
-//!   left, of both clips. What depth says of hinges and openings is tempered (`inference.temperature`): its covariance is
+//!   left, of both clips. What depth says of hinges and openings is widened (`inference.shared_errors`): its covariance is
 //!   multiplied.
 //! - Any other opening: the prior of a grip, and what the hinge's error adds to first order.
 

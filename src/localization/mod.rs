@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::articulation::{Action, Outcome};
 use crate::config;
-use crate::hands::Trajectory;
+use crate::hands::{Trajectory, grip_std_m};
 use crate::math::Point;
 use crate::recording::sketch::Sketch;
 use crate::recording::{Clip, HAND_CLASS, Recording};
@@ -56,6 +56,7 @@ pub fn localize(
     sketches: &BTreeMap<usize, Sketch>,
     config: &config::Localization,
 ) -> Outcome<Region> {
+    const NEAR_M: f64 = 0.2;
     let grip = trajectory.closed_grip();
     let frames = local_frames(recording, clip, trajectory, config);
     let Some(&nearest) = frames.first() else {
@@ -80,11 +81,14 @@ pub fn localize(
         }
     }
     let counts = voxels::count_views(&seen, config.voxel_m);
+    // A grip stands off its face by a handle, and hands are estimated to a few centimetres. One that was first seen on the way
+    // is as far from where it took hold as it is uncertain.
+    let near_m = if trajectory.closed_end_seen() { NEAR_M } else { NEAR_M + 2.0 * grip_std_m(false) };
     // Fewer views than asked for where nothing reaches them: a coarse region is better than none, and it says so.
     for min_views in (1..=config.min_views).rev() {
         let confident: Vec<[i32; 3]> =
             counts.iter().filter(|(_, n)| *n as usize >= min_views).map(|(v, _)| *v).collect();
-        let connected = voxels::connected_with(&confident, &grip, config.voxel_m);
+        let connected = voxels::connected_with(&confident, &grip, config.voxel_m, near_m);
         // A face of 30 x 30 cm fills 36 voxels of 5 cm; a third of that is no furniture.
         if connected.len() >= 12 {
             let inside: std::collections::HashSet<[i32; 3]> = connected.iter().copied().collect();

@@ -105,15 +105,13 @@ impl Table {
     }
 }
 
-/// The voxels of the connected piece (26 neighbours) nearest to the grip, sorted; empty where none is within 20 cm of it.
+/// The voxels of the connected piece (26 neighbours) nearest to the grip, sorted; empty where none is within `near_m` of it.
 #[must_use]
-pub fn connected_with(voxels: &[[i32; 3]], grip: &Point, voxel_m: f64) -> Vec<[i32; 3]> {
-    // A grip stands off its face by a handle, and hands are estimated to a few centimetres.
-    const NEAR_M: f64 = 0.2;
+pub fn connected_with(voxels: &[[i32; 3]], grip: &Point, voxel_m: f64, near_m: f64) -> Vec<[i32; 3]> {
     let mut left: HashSet<[i32; 3]> = voxels.iter().copied().collect();
     let seeds: Vec<[i32; 3]> = {
         let mut near: Vec<(f64, [i32; 3])> =
-            voxels.iter().map(|v| ((center(v, voxel_m) - grip).norm(), *v)).filter(|(d, _)| *d <= NEAR_M).collect();
+            voxels.iter().map(|v| ((center(v, voxel_m) - grip).norm(), *v)).filter(|(d, _)| *d <= near_m).collect();
         near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         near.into_iter().map(|(_, v)| v).collect()
     };
@@ -166,7 +164,7 @@ mod tests {
         let near: Vec<[i32; 3]> = (0..5).map(|i| [i, 0, 0]).collect();
         let far: Vec<[i32; 3]> = (10..15).map(|i| [i, 0, 0]).collect();
         let all: Vec<[i32; 3]> = near.iter().chain(&far).copied().collect();
-        assert_eq!(connected_with(&all, &Point::new(0.0, 0.05, 0.0), 0.05), near);
-        assert!(connected_with(&all, &Point::new(0.0, 9.0, 0.0), 0.05).is_empty());
+        assert_eq!(connected_with(&all, &Point::new(0.0, 0.05, 0.0), 0.05, 0.2), near);
+        assert!(connected_with(&all, &Point::new(0.0, 9.0, 0.0), 0.05, 0.2).is_empty());
     }
 }

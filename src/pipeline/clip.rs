@@ -117,12 +117,17 @@ pub(super) fn infer(
     };
     result.words = reasoner.words(&Sight { recording, clip, region, views: &result.views, lines: &result.lines })?;
     let surface = surface(recording, region, &result.views, &seen.looks.sketches, config.localization.reach_m);
+    // Where people said "it", a model may have seen what it was.
+    let furniture =
+        located.reading.furniture.as_deref().or_else(|| result.words.as_ref().and_then(|w| w.furniture.as_deref()));
     let around = face::Surroundings {
         surface: &surface,
         grips: [region.grip, trajectory.open_grip()],
         viewpoint: region.viewpoint,
         manhattan: seen.room,
+        lines: &result.lines,
         up: upward(recording, seen.room),
+        level: narration::level_share(furniture, config.reasoning.name_accuracy),
     };
     result.face = face::fit(&around, &config.geometry, config.seed);
 
@@ -179,7 +184,7 @@ pub(super) fn infer(
             &result.candidates,
             &answer,
             face,
-            result.part.is_some(),
+            result.part.is_some() || (result.face.is_some() && located.reading.names_furniture()),
             &config.reasoning,
             &config.inference,
         ),

@@ -112,10 +112,10 @@ pub struct SceneJoint {
 pub struct Hypothesis {
     /// The joint; positive opens.
     pub joint: Articulation,
-    /// Probability of type and axis, not tempered: of the weight of all explanations the share that agrees. The hypotheses
+    /// Probability of type and axis: of the weight of all explanations the share that agrees. The hypotheses
     /// of a part share at most 1.
     pub share: f64,
-    /// Probability of its type, not tempered.
+    /// Probability of its type.
     pub type_share: f64,
     /// As [`SceneJoint::uncertainty`].
     #[serde(default, skip_serializing_if = "Option::is_none")]

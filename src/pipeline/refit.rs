@@ -57,9 +57,9 @@ pub(super) fn refitted<'a>(
         .collect();
     let ends = left_where_found(shown, &ends);
     let ranges = ends.iter().map(|end| end.value.max(0.0)).collect();
-    // The views share a hand, a depth estimate and an outline: what they say together is tempered as probabilities are, which
-    // for a covariance is a factor.
-    let shared = config.inference.temperature;
+    // The views share a hand, a depth estimate and an outline: their covariances, which take
+    // them for independent, are too small.
+    let shared = config.inference.shared_errors;
     let depth = OpenStates {
         across: fit.across,
         hinge_cov_m2: fit.hinge_cov_m2.map(|rows| rows.map(|row| row.map(|x| shared * x))),

@@ -40,7 +40,7 @@ pub(super) fn merge(
             closed: trajectory.closed_grip(),
             open: trajectory.open_grip(),
             normal: clip.face.map(|f| f.normal),
-            kind: narration::read(&clip.clip).kind.filter(|_| !narration::read(&clip.clip).generic),
+            kind: Some(narration::read(&clip.clip)).filter(narration::Reading::names_furniture).and_then(|r| r.kind),
             part: clip.face.zip(clip.part),
             joint: clip.joint.found().filter(|j| j.type_probability > 0.7).map(|j| j.joint),
         })
@@ -99,7 +99,7 @@ struct Judged {
     grip: Point,
     /// How the part could move, the answer first; never empty.
     likely: Vec<Likely>,
-    /// Of the answer, tempered.
+    /// Of the answer.
     type_probability: f64,
     joint_probability: f64,
 }
@@ -274,11 +274,8 @@ fn judged(group: &Group, reasoner: &dyn Reasoner) -> Option<Judged> {
             let all: Vec<(Articulation, f64)> =
                 pooled.iter().zip(&weights).map(|(k, w)| (k.joint, (w - weights[top]).exp())).collect();
             joint = aggregate::consensus(&pooled[top].joint, &all);
-            let raw = revolute_probability.max(1.0 - revolute_probability);
-            let temperature = config.inference.temperature;
-            type_probability = inference::tempered(raw, temperature);
-            joint_probability =
-                inference::tempered(raw * inference::agreeing_share(&pooled[top].joint, &all), temperature);
+            type_probability = revolute_probability.max(1.0 - revolute_probability);
+            joint_probability = type_probability * inference::agreeing_share(&pooled[top].joint, &all);
             all_likely = likely(&pooled, &answer, true);
         }
     } else if let (InferenceMethod::Posterior, Some(answer)) = (config.inference.method, &clips[best].answer) {

@@ -8,6 +8,7 @@ use crate::articulation::JointKind;
 use crate::config;
 use crate::geometry::{AxisCandidate, AxisSource, Face, HingeSide};
 use crate::math::{Vector, path};
+use crate::recording::narration::{self, Hung};
 
 use super::words::line_factor;
 use super::{Answer, PartShape, Question, Reasoner};
@@ -31,7 +32,9 @@ impl Reasoner for Geometric {
             .candidates
             .iter()
             .zip(question.agreement)
-            .map(|(candidate, agreement)| self.path_log_likelihood(candidate, question) + agreement)
+            .map(|(candidate, agreement)| {
+                (self.path_log_likelihood(candidate, question) + agreement) / self.reasoning.evidence_temperature
+            })
             .collect();
         let name = match question.reading.kind {
             Some(kind) => {
@@ -44,7 +47,8 @@ impl Reasoner for Geometric {
         };
         let model = question.words.map_or(0.0, |w| w.log_odds(self.reasoning.vlm_accuracy));
         let words_log_odds = of_both(name, model);
-        Answer { log_likelihoods, log_priors: log_priors(question), words_log_odds }
+        let log_priors = log_priors(question, self.reasoning.name_accuracy);
+        Answer { log_likelihoods, log_priors, words_log_odds }
     }
 }
 
@@ -83,8 +87,11 @@ impl Geometric {
 
 /// Prior of each candidate: that of its source, shared among the candidates of that source (thirty lines are not thirty
 /// times as likely to hold the hinge as three), times that of its place on the part.
-fn log_priors(question: &Question) -> Vec<f64> {
+fn log_priors(question: &Question, name_accuracy: f64) -> Vec<f64> {
+    /// Candidates of a source are shared among the edges of a face already; edges that are all alike change nothing.
+    const EDGES: f64 = 4.0;
     let candidates = question.candidates;
+    let habit = Habit::of(question, name_accuracy);
     let is_lid = question.face.is_some_and(|face| face.is_horizontal(&question.up));
     // Lines that are long and seen often are edges of furniture rather than of its texture, and lines that a language model
     // takes for hinges rather than others.
@@ -102,8 +109,10 @@ fn log_priors(question: &Question) -> Vec<f64> {
             };
             let total: f64 = candidates.iter().filter(same).map(raw).sum();
             let share = (raw(c) / total.max(1e-12)).ln();
-            own.map_or_else(|| source_prior(c.source), slide_prior).ln() + share - 0.5 * c.shift * c.shift
-                + question.part.map_or(0.0, |part| shape_log_prior(c, &part, is_lid))
+            own.map_or_else(|| source_prior(c.source), |class| habit.slide(class)).ln() + share
+                - 0.5 * c.shift * c.shift
+                + c.side.map_or(0.0, |side| (EDGES * habit.hinge(side, is_lid)).ln())
+                + question.part.map_or(0.0, |part| shape_log_prior(c, &part))
         })
         .collect()
 }
@@ -136,15 +145,55 @@ fn slide_class(candidate: &AxisCandidate, face: &Face, up: &Vector) -> Option<Sl
     })
 }
 
-/// What furniture does: drawers come straight out, some doors slide aside, next to nothing is lifted along its front or
-/// slides where a lid is.
-fn slide_prior(class: SlideClass) -> f64 {
-    match class {
-        SlideClass::Out => 0.8,
-        SlideClass::Aside => 0.1,
-        SlideClass::Level => 0.06,
-        SlideClass::Askew => 0.04,
-        SlideClass::Lift => 0.02,
+/// How furniture is hung: what is usual, and what is said of furniture of this name as far as names are trusted.
+#[derive(Debug, Clone, Copy)]
+struct Habit {
+    named: Option<Hung>,
+    trust: f64,
+}
+
+/// Fronts of no name: most hinges are upright, most slides come straight out.
+const USUAL: Hung = Hung { upright: 0.68, bottom: 0.2, top: 0.12, lid: 0.0, out: 0.8, aside: 0.1, lift: 0.02 };
+
+impl Habit {
+    fn of(question: &Question, trust: f64) -> Self {
+        Self { named: question.furniture().and_then(narration::hung), trust }
+    }
+
+    /// A share of `of`, of the name's where it knows any such furniture.
+    fn share(&self, usual: f64, part: impl Fn(&Hung) -> f64, of: impl Fn(&Hung) -> f64) -> f64 {
+        match self.named.filter(|n| of(n) > 0.0) {
+            Some(named) => self.trust * part(&named) / of(&named) + (1.0 - self.trust) * usual,
+            None => usual,
+        }
+    }
+
+    /// Prior of the edge of a hinge. A lid turns about its far edge; `up` on a level face points away from the person.
+    fn hinge(&self, side: HingeSide, is_lid: bool) -> f64 {
+        if is_lid {
+            let far =
+                self.share(0.7, |h| h.lid, |h| if h.lid > 0.0 { h.lid + h.upright + h.bottom + h.top } else { 0.0 });
+            return if side == HingeSide::Top { far } else { (1.0 - far) / 3.0 };
+        }
+        let of = |h: &Hung| h.upright + h.bottom + h.top;
+        let share = |part: fn(&Hung) -> f64| self.share(part(&USUAL), part, of);
+        match side {
+            HingeSide::Left | HingeSide::Right => 0.5 * share(|h| h.upright),
+            HingeSide::Bottom => share(|h| h.bottom),
+            HingeSide::Top => share(|h| h.top),
+        }
+    }
+
+    /// Prior of a slide: next to nothing slides where a lid is, or askew.
+    fn slide(&self, class: SlideClass) -> f64 {
+        let share = |part: fn(&Hung) -> f64| self.share(part(&USUAL), part, |h| h.out + h.aside + h.lift);
+        match class {
+            SlideClass::Out => share(|h| h.out),
+            SlideClass::Aside => share(|h| h.aside),
+            SlideClass::Level => self.share(0.06, |_| 0.0, |h| h.out + h.aside + h.lift),
+            SlideClass::Askew => self.share(0.04, |_| 0.0, |h| h.out + h.aside + h.lift),
+            SlideClass::Lift => share(|h| h.lift),
+        }
     }
 }
 
@@ -164,7 +213,7 @@ fn source_prior(source: AxisSource) -> f64 {
 }
 
 /// Where the grip sits and how wide the front is, under each kind of joint.
-fn shape_log_prior(candidate: &AxisCandidate, part: &PartShape, is_lid: bool) -> f64 {
+fn shape_log_prior(candidate: &AxisCandidate, part: &PartShape) -> f64 {
     // Furniture that follows no habit, and parts that are localised wrongly.
     const FLOOR: f64 = 0.35;
     let gauss = |x: f64, mean: f64, std: f64| (-0.5 * ((x - mean) / std).powi(2)).exp();
@@ -181,17 +230,8 @@ fn shape_log_prior(candidate: &AxisCandidate, part: &PartShape, is_lid: bool) ->
         (_, Some(HingeSide::Top)) => (gauss(up, -EDGE, 0.12), 0.5),
         (_, None) => return 0.0,
     };
-    // A lid turns about its far edge; `up` on a level face points away from the person.
-    let side: f64 = match (candidate.side, is_lid) {
-        (Some(HingeSide::Top), true) => 0.7,
-        (Some(_), true) => 0.1,
-        (Some(HingeSide::Left | HingeSide::Right), false) => 0.34,
-        (Some(HingeSide::Bottom), false) => 0.2,
-        (Some(HingeSide::Top), false) => 0.12,
-        (None, _) => 1.0,
-    };
     // A hinge at the part's own edge: the distance from the grip is the part's extent from there.
-    side.ln() + (FLOOR + (1.0 - FLOOR) * grip).ln() + (FLOOR + (1.0 - FLOOR) * shape).ln()
+    (FLOOR + (1.0 - FLOOR) * grip).ln() + (FLOOR + (1.0 - FLOOR) * shape).ln()
 }
 
 #[cfg(test)]
@@ -273,17 +313,20 @@ mod tests {
         let reading = Reading { moves_joint: Some(true), action: None, furniture: None, kind: None, generic: false };
         let priors = |named: f64| {
             let candidates = [line(named), line(0.0), edge.clone()];
-            log_priors(&Question {
-                reading: &reading,
-                words: None,
-                path: &[],
-                grip: Point::origin(),
-                candidates: &candidates,
-                agreement: &[],
-                part: None,
-                face: None,
-                up: Vector::z(),
-            })
+            log_priors(
+                &Question {
+                    reading: &reading,
+                    words: None,
+                    path: &[],
+                    grip: Point::origin(),
+                    candidates: &candidates,
+                    agreement: &[],
+                    part: None,
+                    face: None,
+                    up: Vector::z(),
+                },
+                0.9,
+            )
         };
         let (before, after) = (priors(0.0), priors(1.0));
         assert!((after[0] - after[1] - 5f64.ln()).abs() < 1e-12 && before[0] == before[1]);
@@ -294,5 +337,26 @@ mod tests {
     #[test]
     fn no_candidates_leave_the_type_open() {
         assert!((ask(&[Point::origin()], None, &[], &[]) - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_name_tells_the_edge_and_the_way_of_a_slide_as_far_as_it_is_trusted() {
+        let habit = |name: Option<&str>| Habit { named: name.and_then(narration::hung), trust: 0.9 };
+        let [unnamed, dishwasher, drawer, chest] = [None, Some("dishwasher"), Some("drawer"), Some("chest")].map(habit);
+        let edges = [HingeSide::Left, HingeSide::Right, HingeSide::Top, HingeSide::Bottom];
+        for h in [unnamed, dishwasher, drawer, chest] {
+            for lid in [false, true] {
+                let total: f64 = edges.iter().map(|e| h.hinge(*e, lid)).sum();
+                assert!((total - 1.0).abs() < 1e-9, "{h:?} {lid}");
+            }
+            let ways = [SlideClass::Out, SlideClass::Aside, SlideClass::Lift, SlideClass::Level, SlideClass::Askew];
+            assert!(ways.iter().map(|w| h.slide(*w)).sum::<f64>() < 1.03);
+        }
+        assert!(unnamed.hinge(HingeSide::Left, false) > unnamed.hinge(HingeSide::Bottom, false));
+        assert!(dishwasher.hinge(HingeSide::Bottom, false) > 0.9);
+        // A drawer's name says nothing about the edges of hinges.
+        assert_eq!(drawer.hinge(HingeSide::Bottom, false), unnamed.hinge(HingeSide::Bottom, false));
+        assert!(drawer.slide(SlideClass::Aside) < 0.2 * unnamed.slide(SlideClass::Aside));
+        assert!(chest.hinge(HingeSide::Top, true) > unnamed.hinge(HingeSide::Top, true));
     }
 }

@@ -42,6 +42,14 @@ pub struct Question<'a> {
     pub up: Vector,
 }
 
+impl Question<'_> {
+    /// The furniture's name: the narration's; where people said "it", a language model's.
+    #[must_use]
+    pub fn furniture(&self) -> Option<&str> {
+        self.reading.furniture.as_deref().or_else(|| self.words?.furniture.as_deref())
+    }
+}
+
 /// Shape of the moving part's front and where it is held.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PartShape {

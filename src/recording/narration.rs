@@ -27,6 +27,49 @@ struct Lexicon {
     portable: Vec<String>,
     handheld: Vec<String>,
     control: Vec<String>,
+    hung: Vec<Habit>,
+}
+
+/// Names and what they are said of.
+#[derive(Debug, Deserialize)]
+struct Habit {
+    names: Vec<String>,
+    #[serde(flatten)]
+    ways: Hung,
+}
+
+/// How furniture of one name is hung: shares of all such furniture.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Hung {
+    /// Hinged at an upright edge of its front.
+    pub upright: f64,
+    /// Hinged at the front's lower edge.
+    pub bottom: f64,
+    /// Hinged at the front's upper edge.
+    pub top: f64,
+    /// Hinged at the far edge of a level face.
+    pub lid: f64,
+    /// Slides out of its front.
+    pub out: f64,
+    /// Slides to the side within its front.
+    pub aside: f64,
+    /// Slides up or down within its front.
+    pub lift: f64,
+}
+
+/// How furniture of that name is hung, where the name is known; lower case, as [`Reading::furniture`].
+#[must_use]
+pub fn hung(furniture: &str) -> Option<Hung> {
+    let said = |name: &String| same(furniture, name);
+    LEXICON.hung.iter().find(|habit| habit.names.iter().any(said)).map(|habit| habit.ways)
+}
+
+/// Share of the furniture of a name whose moving face is level, where names are right in a share `accuracy`; one half where
+/// nothing is known.
+#[must_use]
+pub fn level_share(furniture: Option<&str>, accuracy: f64) -> f64 {
+    furniture.and_then(hung).map_or(0.5, |h| accuracy * h.lid + (1.0 - accuracy) * 0.5)
 }
 
 /// What the words say. `None` where they say nothing.
@@ -42,6 +85,14 @@ pub struct Reading {
     pub kind: Option<JointKind>,
     /// The name is a generic one ("door"), said of whatever opens.
     pub generic: bool,
+}
+
+impl Reading {
+    /// Whether they name a piece of furniture that opens, rather than "door" or "it".
+    #[must_use]
+    pub fn names_furniture(&self) -> bool {
+        self.kind.is_some() && !self.generic
+    }
 }
 
 /// Reads a clip's narration, verb and noun.
@@ -243,5 +294,22 @@ mod tests {
             assert_eq!((r.moves_joint, r.action, r.kind), (Some(moves), action, kind), "{text}");
         }
         assert_eq!(reading("").moves_joint, None);
+    }
+
+    #[test]
+    fn every_name_has_one_habit_that_is_of_its_type() {
+        let names = || LEXICON.hung.iter().flat_map(|h| h.names.iter().map(move |n| (n, h.ways)));
+        for (list, hinged) in [(&LEXICON.hinge, true), (&LEXICON.generic, true), (&LEXICON.slide, false)] {
+            for name in list {
+                assert_eq!(names().filter(|(n, _)| *n == name).count(), 1, "{name}");
+                let ways = hung(name).unwrap();
+                let turns = ways.upright + ways.bottom + ways.top + ways.lid;
+                let slides = ways.out + ways.aside + ways.lift;
+                assert!((turns + slides - 1.0).abs() < 1e-9 && (turns > slides) == hinged, "{name}: {ways:?}");
+            }
+        }
+        assert_eq!(names().count(), LEXICON.hinge.len() + LEXICON.generic.len() + LEXICON.slide.len());
+        assert!(hung("bottle").is_none() && level_share(None, 0.9) == 0.5);
+        assert!(level_share(Some("chest"), 0.9) > 0.85 && level_share(Some("drawer"), 0.9) < 0.1);
     }
 }
