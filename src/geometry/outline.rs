@@ -150,6 +150,47 @@ impl CellVotes {
         if bounds.iter().any(|b| b[1] - b[0] < 0.05) { rect } else { Rect { bounds } }
     }
 
+    /// How much of the front a leaf that slides within it has left free, metres: the width along `axis` (0 = right, 1 = up) of
+    /// the strip at the grip that is seen through over the rows `across`. `None` where no view saw enough of it.
+    #[must_use]
+    pub fn vacated(&self, axis: usize, across: [f64; 2]) -> Option<f64> {
+        /// Fewer seen cells in a line across the slide are noise.
+        const LEAST_SEEN: usize = 4;
+        /// The strip begins at a leaf's end, near which its grip is, metres.
+        const NEAR_M: f64 = 0.15;
+        let count = [self.columns, self.rows][axis];
+        let rows = ((across[1] - across[0]) / self.cell_m).round().max(1.0) as usize;
+        // Of each line of cells across the slide: seen through (1) or there as before (-1).
+        let balance = |i: usize| -> f64 {
+            let along = self.origin[axis] + (i as f64 + 0.5) * self.cell_m;
+            let (mut gone, mut seen) = (0usize, 0usize);
+            for k in 0..rows {
+                let other = across[0] + (k as f64 + 0.5) * self.cell_m;
+                let cell = if axis == 0 { self.index(along, other) } else { self.index(other, along) };
+                let Some(cell) = cell.filter(|&c| self.closed[c] > 0 && self.gone[c] != self.still[c]) else {
+                    continue;
+                };
+                seen += 1;
+                gone += usize::from(self.gone[cell] > self.still[cell]);
+            }
+            if seen < LEAST_SEEN { 0.0 } else { 2.0 * gone as f64 / seen as f64 - 1.0 }
+        };
+        let line: Vec<f64> = (0..count).map(balance).collect();
+        // Ends of the strip whose lines add up to most.
+        let (mut best, mut strip) = (0.0, None);
+        for from in 0..count {
+            let mut sum = 0.0;
+            for to in from..count {
+                sum += line[to];
+                let [low, high] = [from, to + 1].map(|i| self.origin[axis] + i as f64 * self.cell_m);
+                if sum > best && low < NEAR_M && high > -NEAR_M {
+                    (best, strip) = (sum, Some(high - low));
+                }
+            }
+        }
+        strip
+    }
+
     /// Of the cells of a strip that open views saw, the share that was seen to stay (for a strip to be added) or to move (for
     /// one to be taken away).
     fn against(&self, axis: usize, strip: [f64; 2], across: [f64; 2], added: bool) -> f64 {

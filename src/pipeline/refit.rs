@@ -3,13 +3,15 @@
 use std::collections::BTreeMap;
 
 use super::ClipResult;
-use crate::articulation::{Action, Articulation};
+use crate::articulation::{Action, Articulation, JointKind};
 use crate::config::Config;
+use crate::geometry::candidates::IN_FACE;
 use crate::geometry::moved::{self, Hold};
 use crate::geometry::openings::{self, OpenState, Opening};
-use crate::geometry::{Face, Rect};
+use crate::geometry::{Face, Rect, outline};
 use crate::hands::{self, Trajectory};
 use crate::inference::uncertainty::OpenStates;
+use crate::math::Point;
 use crate::recording::Recording;
 use crate::recording::sketch::Sketch;
 
@@ -25,6 +27,15 @@ pub(super) struct Refitted<'a> {
     pub(super) depth: OpenStates,
 }
 
+/// The part when closed.
+#[derive(Clone, Copy)]
+pub(super) struct Closed<'a> {
+    pub(super) face: Face,
+    pub(super) rect: Rect,
+    /// Points of the furniture, world.
+    pub(super) surface: &'a [Point],
+}
+
 /// The hinge and the openings that the depth of the open states tells. `None` where they were not seen.
 #[allow(clippy::too_many_arguments, reason = "what a group of clips knows")]
 pub(super) fn refitted<'a>(
@@ -32,10 +43,10 @@ pub(super) fn refitted<'a>(
     sketches: &'a BTreeMap<usize, Sketch>,
     shown: &[(&ClipResult, &Trajectory)],
     joint: &Articulation,
-    face: &Face,
-    rect: &Rect,
+    closed: &Closed,
     config: &Config,
 ) -> Option<Refitted<'a>> {
+    let Closed { face, rect, .. } = closed;
     let noise = openings::Noise { hinge_m: config.reasoning.hand_std_m, board_m: config.fitting.board_m };
     let views: Vec<Vec<moved::View>> =
         shown.iter().map(|(clip, t)| moved::open_views(recording, sketches, &clip.clip, t)).collect();
@@ -48,7 +59,16 @@ pub(super) fn refitted<'a>(
             views,
         })
         .collect();
-    let fit = openings::refit(face, rect, joint, &states, &noise)?;
+    let mut fit = openings::refit(face, rect, joint, &states, &noise)?;
+    if let Some(axis) = within_front(joint, face) {
+        // Along its front a leaf shows no depth of its own; the place that it left does.
+        for (view, opening) in states.iter().flat_map(|s| s.views).zip(fit.openings.iter_mut().flatten()) {
+            let votes = outline::vote(face, closed.surface, std::slice::from_ref(view), None, &config.fitting);
+            if let Some(value) = votes.vacated(axis, rect.bounds[1 - axis]) {
+                *opening = Opening { value, std: 2.0 * config.fitting.cell_m, informed: true };
+            }
+        }
+    }
     let ends: Vec<Opening> = shown
         .iter()
         .zip(&states)
@@ -68,6 +88,13 @@ pub(super) fn refitted<'a>(
     let openings = fit.openings.iter().flatten().map(|o| o.value).collect();
     let views = views.into_iter().flatten().collect();
     Some(Refitted { joint: fit.joint, views, openings, ranges, depth })
+}
+
+/// Along which of its front's axes (0 = right, 1 = up) a slide stays within the front; `None` for all other joints.
+fn within_front(joint: &Articulation, face: &Face) -> Option<usize> {
+    let along = [face.right, face.up].map(|a| joint.axis.dot(&a).abs());
+    (joint.kind == JointKind::Prismatic && joint.axis.dot(&face.normal).abs() < IN_FACE)
+        .then(|| usize::from(along[1] > along[0]))
 }
 
 /// Opening at the open end of a clip. After the hand let go the part stands there: what those views show counts, else what is
@@ -127,7 +154,6 @@ fn left_where_found(shown: &[(&ClipResult, &Trajectory)], ends: &[Opening]) -> V
 mod tests {
     use super::*;
     use crate::hands::Sample;
-    use crate::math::Point;
     use crate::recording::Clip;
 
     fn clip(start_frame: usize) -> ClipResult {

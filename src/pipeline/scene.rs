@@ -322,7 +322,14 @@ fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around) -> Hy
         shown.iter().map(|(_, t)| inference::observed_range(&joint, &t.closed_grip(), &t.positions())).collect();
     if config.inference.refit
         && let Some((face, rect)) = face.zip(clips[best].part)
-        && let Some(fit) = refit::refitted(recording, sketches, &shown, &joint, &face, &rect, config)
+        && let Some(fit) = refit::refitted(
+            recording,
+            sketches,
+            &shown,
+            &joint,
+            &refit::Closed { face, rect, surface: &around.surface },
+            config,
+        )
     {
         joint = fit.joint;
         moved = fit.ranges;
