@@ -20,6 +20,26 @@ pub fn median(values: &[f64]) -> Option<f64> {
     quantile(values, 0.5)
 }
 
+/// The value on either side of which half of the weight lies, of (value, weight >= 0): between two values that share it evenly
+/// their middle. `None` without weight.
+#[must_use]
+pub fn weighted_median(values: &[(f64, f64)]) -> Option<f64> {
+    let mut sorted: Vec<(f64, f64)> = values.iter().copied().filter(|(_, w)| *w > 0.0).collect();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * sorted.iter().map(|(_, w)| w).sum::<f64>();
+    let mut below = 0.0;
+    for (i, (value, weight)) in sorted.iter().enumerate() {
+        below += weight;
+        if below > half * (1.0 + 1e-9) {
+            return Some(*value);
+        }
+        if below >= half * (1.0 - 1e-9) {
+            return Some(0.5 * (value + sorted.get(i + 1).map_or(*value, |next| next.0)));
+        }
+    }
+    None
+}
+
 /// Mean; `None` for an empty slice.
 #[must_use]
 pub fn mean(values: &[f64]) -> Option<f64> {
@@ -61,5 +81,13 @@ mod tests {
         let wrapped = [3.0, 3.1, -3.1, -3.0];
         let u = unwrap_angles(&wrapped);
         assert!(u.windows(2).all(|w| (w[1] - w[0]).abs() < 0.2), "{u:?}");
+    }
+
+    #[test]
+    fn a_weighted_median_is_the_median_of_copies() {
+        assert_eq!(weighted_median(&[(3.0, 1.0), (1.0, 1.0), (2.0, 1.0)]), Some(2.0));
+        assert_eq!(weighted_median(&[(1.0, 2.0), (9.0, 1.0), (2.0, 1.0)]), Some(1.5));
+        assert_eq!(weighted_median(&[(1.0, 1.0), (9.0, 5.0)]), Some(9.0));
+        assert_eq!(weighted_median(&[(1.0, 0.0)]), None);
     }
 }

@@ -11,7 +11,7 @@ use crate::geometry::openings::{self, OpenState, Opening};
 use crate::geometry::{Face, Rect, outline};
 use crate::hands::{self, Trajectory};
 use crate::inference::uncertainty::OpenStates;
-use crate::math::Point;
+use crate::math::{Point, stats};
 use crate::recording::Recording;
 use crate::recording::sketch::Sketch;
 
@@ -105,16 +105,11 @@ fn open_end(joint: &Articulation, trajectory: &Trajectory, state: &OpenState, se
     // The mean of what some views say, and the standard deviation of the surest of them: they share the hand's and the depth's
     // errors, so together they are no surer.
     let mean = |of: &dyn Fn(usize) -> Option<f64>| -> Option<(f64, f64)> {
-        let (mut sum, mut total, mut surest) = (0.0, 0.0, f64::INFINITY);
-        for (i, opening) in seen.iter().enumerate() {
-            if let Some(value) = of(i) {
-                let weight = opening.std.powi(-2);
-                sum += weight * value;
-                total += weight;
-                surest = surest.min(opening.std);
-            }
-        }
-        (total > 0.0).then(|| (sum / total, surest))
+        let told: Vec<(f64, f64)> =
+            seen.iter().enumerate().filter_map(|(i, opening)| Some((of(i)?, opening.std.powi(-2)))).collect();
+        let surest =
+            seen.iter().enumerate().filter(|(i, _)| of(*i).is_some()).map(|(_, o)| o.std).fold(f64::INFINITY, f64::min);
+        Some((stats::weighted_median(&told)?, surest))
     };
     let of = |hold: Hold| mean(&|i| (state.views[i].hold == hold && seen[i].informed).then_some(seen[i].value));
     let after = of(Hold::Left).or(of(Hold::Lost)).or(of(Hold::Free));
