@@ -237,11 +237,10 @@ fn weight(residual: f64, scale: f64) -> f64 {
 fn coarse(sights: &Sights, joint: &Articulation, clip: &OpenState, views: &[Seen], hold: Hold, lever: f64) -> f64 {
     // Two centimetres at the grip, which the depth's tolerance bridges.
     const STEP_M: f64 = 0.02;
-    const REACH: f64 = 3.0;
     let of_sort = || views.iter().filter(|s| s.view.hold == hold);
     let Some(std) = of_sort().map(|s| s.std).next() else { return 0.0 };
     let step = STEP_M / lever;
-    let steps = (REACH * std / step).round() as i32;
+    let steps = (reach(hold) * std / step).round() as i32;
     let widest = of_sort().map(|s| s.hand).fold(0.0, f64::max);
     (-steps..=steps)
         .map(|k| f64::from(k) * step)
@@ -254,6 +253,14 @@ fn coarse(sights: &Sights, joint: &Articulation, clip: &OpenState, views: &[Seen
         })
         .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.abs().total_cmp(&a.1.abs())))
         .map_or(0.0, |(_, offset)| offset)
+}
+
+/// Standard deviations to each side in which an offset is looked for: a hand that was lost may have been at the start of its way.
+fn reach(hold: Hold) -> f64 {
+    match hold {
+        Hold::Sure | Hold::Free => 3.0,
+        Hold::Lost | Hold::Left => 6.0,
+    }
 }
 
 struct Equations {

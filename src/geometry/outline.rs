@@ -25,6 +25,9 @@ pub struct CellVotes {
     gone: Vec<u16>,
 }
 
+/// What the smallest front has about its grip.
+pub const SMALLEST: Rect = Rect { bounds: [[-0.12, 0.12]; 2] };
+
 /// Votes of the closed surface and the open views over the face's visible extent (at most 1.2 m from the grip). With a
 /// `joint` and its opening in each view, cells also count as moved where the part is seen in its opened place.
 #[must_use]

@@ -11,6 +11,7 @@ use std::cmp::Ordering;
 use super::Face;
 use super::face::Rect;
 use super::moved::{Hold, MIN_POINTS, View, tolerance};
+use super::outline::SMALLEST;
 use super::rays::Rays;
 use crate::articulation::Articulation;
 use crate::math::Point;
@@ -146,10 +147,8 @@ impl<'a> Sights<'a> {
     /// A grid over the part, or over a piece of its face around the grip where the part is not known.
     #[must_use]
     pub fn of(face: &'a Face, rect: Option<&Rect>, views: &'a [View<'a>]) -> Self {
-        // What the smallest front has.
-        const HALF_M: f64 = 0.12;
         const STEPS: usize = 12;
-        let bounds = rect.map_or([[-HALF_M, HALF_M]; 2], |r| r.bounds);
+        let bounds = rect.unwrap_or(&SMALLEST).bounds;
         let at = |k: usize, b: [f64; 2]| b[0] + (b[1] - b[0]) * (k as f64 + 0.5) / STEPS as f64;
         let points: Vec<Point> =
             (0..STEPS * STEPS).map(|i| face.point(at(i % STEPS, bounds[0]), at(i / STEPS, bounds[1]), 0.0)).collect();

@@ -320,8 +320,10 @@ fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around) -> Hy
     let mut part = clips[best].part;
     let mut moved: Vec<f64> =
         shown.iter().map(|(_, t)| inference::observed_range(&joint, &t.closed_grip(), &t.positions())).collect();
+    // A part of which no outline was seen to move: the piece of it around the grip.
+    let rect = part.unwrap_or(outline::SMALLEST);
     if config.inference.refit
-        && let Some((face, rect)) = face.zip(clips[best].part)
+        && let Some(face) = face
         && let Some(fit) = refit::refitted(
             recording,
             sketches,
