@@ -258,8 +258,9 @@ fn coarse(sights: &Sights, joint: &Articulation, clip: &OpenState, views: &[Seen
 /// Standard deviations to each side in which an offset is looked for: a hand that was lost may have been at the start of its way.
 fn reach(hold: Hold) -> f64 {
     match hold {
-        Hold::Sure | Hold::Free => 3.0,
-        Hold::Lost | Hold::Left => 6.0,
+        Hold::Sure => 3.0,
+
+        Hold::Free | Hold::Lost | Hold::Left => 6.0,
     }
 }
 

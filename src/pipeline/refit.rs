@@ -124,8 +124,11 @@ fn open_end(joint: &Articulation, trajectory: &Trajectory, state: &OpenState, se
 }
 
 /// A part stays where it was left: the open end of a clip is where the next clip of the part finds it. Both clips' values
-/// become their weighted mean, which is surer than either: each clip has a hand's and a depth's error of its own.
+/// become their weighted mean, which is surer than either: each clip has a hand's and a depth's error of its own. Where they
+/// are at odds, one of the hands was followed on a part of its way only, and the farther one saw more of it.
 fn left_where_found(shown: &[(&ClipResult, &Trajectory)], ends: &[Opening]) -> Vec<Opening> {
+    /// Standard deviations.
+    const AT_ODDS: f64 = 4.0;
     let mut order: Vec<usize> = (0..shown.len()).collect();
     order.sort_by_key(|&i| (shown[i].0.clip.start_frame, i));
     let mut out = ends.to_vec();
@@ -133,7 +136,13 @@ fn left_where_found(shown: &[(&ClipResult, &Trajectory)], ends: &[Opening]) -> V
         let (a, b) = (pair[0], pair[1]);
         if shown[a].1.action == Action::Open && shown[b].1.action == Action::Close {
             let [wa, wb] = [a, b].map(|i| ends[i].std.powi(-2));
-            if (wa + wb).is_finite() && wa + wb > 0.0 {
+            let apart = (ends[a].value - ends[b].value).abs() / ends[a].std.hypot(ends[b].std);
+            if apart > AT_ODDS {
+                let farther = if ends[a].value > ends[b].value { ends[a] } else { ends[b] };
+                for i in [a, b] {
+                    out[i] = Opening { informed: ends[i].informed, ..farther };
+                }
+            } else if (wa + wb).is_finite() && wa + wb > 0.0 {
                 let value = (wa * ends[a].value + wb * ends[b].value) / (wa + wb);
                 let std = (wa + wb).sqrt().recip();
                 for i in [a, b] {
