@@ -259,7 +259,6 @@ fn coarse(sights: &Sights, joint: &Articulation, clip: &OpenState, views: &[Seen
 fn reach(hold: Hold) -> f64 {
     match hold {
         Hold::Sure => 3.0,
-
         Hold::Free | Hold::Lost | Hold::Left => 6.0,
     }
 }
