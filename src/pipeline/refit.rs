@@ -113,14 +113,16 @@ fn open_end(joint: &Articulation, trajectory: &Trajectory, state: &OpenState, se
     };
     let of = |hold: Hold| mean(&|i| (state.views[i].hold == hold && seen[i].informed).then_some(seen[i].value));
     let after = of(Hold::Left).or(of(Hold::Lost)).or(of(Hold::Free));
-    let during = mean(&|i| (state.views[i].hold == Hold::Sure && told[i] > 0.8 * end).then(|| seen[i].value - told[i]));
+    // A hand is off by the same all along a clip: views that see the part on its way tell by how much.
+    let on_way = |i: usize| state.views[i].hold == Hold::Sure && seen[i].informed && told[i] > 0.3 * end;
+    let during = mean(&|i| on_way(i).then(|| seen[i].value - told[i]));
     let any = seen.iter().map(|o| o.std).fold(f64::INFINITY, f64::min);
     let (value, surest) = after.or(during.map(|(offset, std)| (end + offset, std))).unwrap_or((end, any));
     // A hand that was lost and a part that nobody saw afterwards leave the end open.
     let lever = joint.lever(&state.grip).max(openings::LEAST_LEVER_M);
     let unseen = after.is_none() && !trajectory.open_end_seen();
     let std = if unseen { surest.hypot(hands::grip_std_m(false) / lever) } else { surest };
-    Opening { value, std, informed: seen.iter().any(|o| o.informed) }
+    Opening { value, std, informed: after.or(during).is_some() }
 }
 
 /// A part stays where it was left: the open end of a clip is where the next clip of the part finds it. Both clips' values
@@ -137,10 +139,10 @@ fn left_where_found(shown: &[(&ClipResult, &Trajectory)], ends: &[Opening]) -> V
         if shown[a].1.action == Action::Open && shown[b].1.action == Action::Close {
             let [wa, wb] = [a, b].map(|i| ends[i].std.powi(-2));
             let apart = (ends[a].value - ends[b].value).abs() / ends[a].std.hypot(ends[b].std);
-            if apart > AT_ODDS {
+            if apart > AT_ODDS && ends[a].informed && ends[b].informed {
                 let farther = if ends[a].value > ends[b].value { ends[a] } else { ends[b] };
                 for i in [a, b] {
-                    out[i] = Opening { informed: ends[i].informed, ..farther };
+                    out[i] = farther;
                 }
             } else if (wa + wb).is_finite() && wa + wb > 0.0 {
                 let value = (wa * ends[a].value + wb * ends[b].value) / (wa + wb);
