@@ -66,6 +66,7 @@ fn unit(number: usize, x: f64, z: f64) -> Furniture {
                 friction: if door { 0.2 } else { 2.0 },
                 resistance_seen: false,
                 balanced: false,
+                probability: None,
             },
             bounds: board([x + 0.25, 0.009, z + 0.35], [0.247, 0.347, 0.009]),
             solids,

@@ -33,9 +33,9 @@ use paws_twin::recording::{Recording, narration};
 use paws_twin::report::table::aligned;
 use paws_twin::synth::kitchen::OpenPart;
 use paws_twin::synth::{Changes, Options, Recorded, Tier};
-use paws_twin::twin::{OrientedBox, Twin};
+use paws_twin::twin::{OrientedBox, Part, Twin};
 use paws_twin::validation::rivals::{Evidence, anchored};
-use paws_twin::validation::{JointCheck, Validation, Verdict, validate};
+use paws_twin::validation::{JointCheck, Validation, Verdict, log_odds, validate};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -116,6 +116,13 @@ impl Trial {
     fn of(fault: Option<Fault>, check: &JointCheck) -> Self {
         let margin_nats = check.margin_nats.unwrap_or(f64::NAN);
         Self { fault, verdict: check.verdict, rms_m: check.rms_m, margin_nats }
+    }
+
+    /// What the verdict about an answer rests on: the lesser of the hands' margin and the answer's own log odds.
+    fn of_answer(part: &Part, check: &JointCheck) -> Self {
+        let trial = Self::of(None, check);
+        let odds = part.joint.probability.map_or(f64::INFINITY, log_odds);
+        Self { margin_nats: trial.margin_nats.min(odds), ..trial }
     }
 }
 
@@ -664,12 +671,12 @@ fn answers_of(folder: &Path, first: usize, truths: &[Truth]) -> Result<Vec<Answe
         // The clips of a joint share its answer but for the range: it is right where more than half of them are.
         let right = [0, 1].map(|rule| 2 * judged.values().filter(|r| r[rule]).count() > judged.len());
         if let Some(check) = written.joints.iter().find(|j| j.id == part.id).filter(|_| !judged.is_empty()) {
-            answers.push(Answer { joint, kind, right, alone: false, trial: Trial::of(None, check) });
+            answers.push(Answer { joint, kind, right, alone: false, trial: Trial::of_answer(part, check) });
         }
         for (clip, trajectory) in hands.iter().filter(|h| h.joint == part.id).flat_map(|h| &h.clips) {
             let Some(right) = judged.get(clip.as_str()).copied() else { continue };
             if let Some(check) = proved(&twin, index, vec![(clip.clone(), trajectory)], &config.validation)? {
-                answers.push(Answer { joint, kind, right, alone: true, trial: Trial::of(None, &check) });
+                answers.push(Answer { joint, kind, right, alone: true, trial: Trial::of_answer(part, &check) });
             }
         }
     }

@@ -502,6 +502,7 @@ mod tests {
                     friction: 0.2,
                     resistance_seen: false,
                     balanced: false,
+                    probability: None,
                 },
                 solids: vec![solid("front", Role::Front, true, leaf)],
                 handle,

@@ -212,6 +212,7 @@ mod tests {
                 expected: 1.6,
                 resistance_seen: false,
                 balanced: false,
+                probability: None,
             },
             solids: vec![Solid { name: "front".to_owned(), role: Role::Front, shape: bounds, seen: true }],
             handle: Point::new(0.45, -0.03, 0.5),

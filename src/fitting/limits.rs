@@ -304,6 +304,7 @@ mod tests {
                     friction: 1.0,
                     resistance_seen: false,
                     balanced: false,
+                    probability: None,
                 },
                 handle: Point::new(0.45, -0.03, 0.4),
                 bounds: front.shape,

@@ -387,6 +387,7 @@ fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
                 friction,
                 resistance_seen: false,
                 balanced: false,
+                probability: Some(plan.joint.joint_probability),
             },
             solids,
             handle,

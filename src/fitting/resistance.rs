@@ -139,6 +139,7 @@ mod tests {
                 friction: 0.2,
                 resistance_seen: false,
                 balanced: false,
+                probability: None,
             },
             solids: vec![Solid { name: String::new(), role: Role::Front, shape, seen: true }],
             handle: Point::new(0.45, -0.03, 0.4),

@@ -402,6 +402,7 @@ mod tests {
                     friction: 0.2,
                     resistance_seen: false,
                     balanced: false,
+                    probability: None,
                 },
                 handle: Point::new(0.45, -0.03, 0.5),
                 bounds: front.shape,

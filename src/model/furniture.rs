@@ -214,6 +214,7 @@ impl Piece<'_> {
                 friction: joint.friction.unwrap_or(0.0).max(0.0),
                 resistance_seen: false,
                 balanced: false,
+                probability: None,
             },
             bounds: bounds(&solids, &corners, &articulation, &handle),
             solids,

@@ -258,7 +258,8 @@ fn held_out(joint: &Articulation, clips: &[Evidence], i: usize) -> Option<f64> {
 ///
 /// **Undetermined**, else, where there is no hand, where the tracking error is above `pass_rms_m`, or where the best rival is
 /// within `margin_nats`: a motion too small for its noise cannot tell them apart. As rivals stand `rival_shift_m` beside a
-/// hinge, what passes is at least known to that.
+/// hinge, what passes is at least known to that. And where the joint's own log odds, after hand, depth and words, are below
+/// `margin_nats`: a hand alone follows some joints that depth speaks against.
 ///
 /// **Pass** else.
 fn judge(
@@ -318,6 +319,13 @@ fn judge(
             format!("over {} a {} looks better, but not by enough to decide", amount(kind, range), rival.name)
         };
         (Verdict::Undetermined, text)
+    } else if let Some(p) = part.joint.probability.filter(|p| log_odds(*p) < config.margin_nats) {
+        let text = format!(
+            "follows the recorded hand to {}, but depth and shape leave other joints a share of {:.0} %",
+            centimetres(rms_m),
+            100.0 * (1.0 - p)
+        );
+        (Verdict::Undetermined, text)
     } else {
         let rivals = best.map_or(String::new(), |r| {
             format!("; the best rival, a {}, is {} as likely", r.name, one_in(r.margin_nats))
@@ -339,6 +347,13 @@ fn judge(
         rivals,
         clips,
     }
+}
+
+/// Log odds of a probability, nats; finite.
+#[must_use]
+pub fn log_odds(probability: f64) -> f64 {
+    let p = probability.clamp(1e-12, 1.0 - 1e-12);
+    (p / (1.0 - p)).ln()
 }
 
 /// A hand that went less far was seen for a moment, not in motion, metres.

@@ -41,6 +41,7 @@ fn door() -> Furniture {
                 expected: 1.9,
                 resistance_seen: false,
                 balanced: false,
+                probability: None,
             },
             solids: vec![solid("front", Role::Front, leaf)],
             handle: Point::new(0.45, -0.03, 0.4),
@@ -126,6 +127,20 @@ fn wrong_joints() -> [(&'static str, Articulation); 8] {
         ("in front", at(0.0, -0.25)),
         ("behind", at(0.0, 0.25)),
     ]
+}
+
+#[test]
+fn a_joint_that_depth_or_words_doubt_does_not_pass_on_the_word_of_a_hand() {
+    let judged = |probability: Option<f64>| {
+        let mut furniture = door();
+        let truth = furniture.part.joint.articulation;
+        furniture.part.joint.probability = probability;
+        verdict(furniture, &hand(&truth, 1.2))
+    };
+    // Twenty to one is what a rival must be less likely by, too.
+    assert_eq!([None, Some(0.96)].map(|p| judged(p).0), [Verdict::Pass; 2]);
+    let (doubted, why) = judged(Some(0.7));
+    assert!(doubted == Verdict::Undetermined && why.contains("30 %"), "{why}");
 }
 
 #[test]
