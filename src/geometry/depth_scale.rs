@@ -33,6 +33,10 @@ const COMMON_STD: f64 = 0.15;
 /// Surfaces this near to each other are taken for one: wide at first, to bridge the error of the scale, then narrow, to
 /// tell surfaces apart.
 const GATES_M: [f64; 3] = [0.2, 0.1, 0.05];
+/// Of the samples every so many-th takes part at each gate: while surfaces are brought together a few tell as much as all.
+const STRIDES: [usize; 3] = [4, 4, 1];
+/// A few coincidences of all samples of two frames are no common surface.
+const LEAST_LINKS: usize = 12;
 /// Comparisons a gate at the most; each brings the places that are compared nearer to each other.
 const ROUNDS: usize = 25;
 
@@ -72,16 +76,16 @@ pub fn solve(recording: &Recording, sketches: &BTreeMap<usize, Sketch>) -> Depth
     }
     let partners: Vec<Vec<usize>> = (0..views.len()).into_par_iter().map(|a| partners(recording, &views, a)).collect();
     let mut factors = vec![1.0; views.len()];
-    'gates: for gate_m in GATES_M {
+    'gates: for (gate_m, stride) in GATES_M.into_iter().zip(STRIDES) {
         for _ in 0..ROUNDS {
             let links: Vec<Vec<Link>> = partners
                 .par_iter()
                 .enumerate()
                 .map(|(a, others)| {
-                    others.iter().flat_map(|&b| compare(recording, &views, [a, b], &factors, gate_m)).collect()
+                    others.iter().flat_map(|&b| compare(recording, &views, [a, b], &factors, gate_m, stride)).collect()
                 })
                 .collect();
-            let Some(next) = adjust(&links, &factors, gate_m) else { break 'gates };
+            let Some(next) = adjust(&links, &factors, gate_m, LEAST_LINKS.div_ceil(stride)) else { break 'gates };
             let moved = next.iter().zip(&factors).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             factors = next;
             if moved < 5e-4 {
@@ -147,8 +151,15 @@ fn partners(recording: &Recording, views: &[View], a: usize) -> Vec<usize> {
     chosen
 }
 
-/// Places of frame a that frame b sees too, under the present factors.
-fn compare(recording: &Recording, views: &[View], [a, b]: [usize; 2], factors: &[f64], gate_m: f64) -> Vec<Link> {
+/// Places of frame a that frame b sees too, under the present factors, of every `stride`-th sample.
+fn compare(
+    recording: &Recording,
+    views: &[View],
+    [a, b]: [usize; 2],
+    factors: &[f64],
+    gate_m: f64,
+    stride: usize,
+) -> Vec<Link> {
     let (from, to) = (&views[a], &views[b]);
     let pose = &recording.frames[to.sketch.frame].world_from_camera;
     let camera: &Camera = &recording.camera;
@@ -156,6 +167,7 @@ fn compare(recording: &Recording, views: &[View], [a, b]: [usize; 2], factors: &
     let baseline = from.center - to.center;
     from.samples
         .iter()
+        .step_by(stride)
         .filter_map(|s| {
             let local = inverse * (from.center + s.offset * factors[a]);
             let (u, v) = camera.project(&local).filter(|_| local.z > 0.2)?;
@@ -185,7 +197,7 @@ impl Link {
 }
 
 /// One robust least-squares step for all factors; `None` where the system cannot be solved.
-fn adjust(links: &[Vec<Link>], factors: &[f64], gate_m: f64) -> Option<Vec<f64>> {
+fn adjust(links: &[Vec<Link>], factors: &[f64], gate_m: f64, least_links: usize) -> Option<Vec<f64>> {
     let n = factors.len();
     // Unknowns: each frame's d, then t of the common factor.
     let mut matrix = DMatrix::<f64>::zeros(n + 1, n + 1);
@@ -197,8 +209,7 @@ fn adjust(links: &[Vec<Link>], factors: &[f64], gate_m: f64) -> Option<Vec<f64>>
             let end = start + of_frame[start..].iter().take_while(|l| l.b == pair).count();
             let members = &of_frame[start..end];
             start = end;
-            // A few coincidences are no common surface.
-            if members.len() < 12 {
+            if members.len() < least_links {
                 continue;
             }
             let weight = (INDEPENDENT / members.len() as f64).min(1.0) / SAMPLE_STD_M.powi(2);

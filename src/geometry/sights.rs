@@ -13,7 +13,7 @@ use super::face::Rect;
 use super::moved::{Hold, MIN_POINTS, View, tolerance};
 use super::outline::SMALLEST;
 use super::rays::Rays;
-use crate::articulation::Articulation;
+use crate::articulation::{Articulation, JointKind};
 use crate::math::Point;
 
 /// What the two readings count in the pool: of (1, 0), (0.75, 0.5) and (0.5, 1) the pair that explains the development seeds of
@@ -42,6 +42,36 @@ const LEAST_LEVER_M: f64 = 0.05;
 pub fn agreement(sights: &Sights, joint: &Articulation, grip: &Point, grip_std_m: f64) -> f64 {
     POINTS_WEIGHT * log_likelihood(by_points(sights, joint, grip, grip_std_m))
         + RAYS_WEIGHT * by_rays(sights, joint, grip, grip_std_m)
+}
+
+/// [`agreement`] of each joint: joints that are the same to what depth can tell are asked about once.
+#[must_use]
+pub fn agreements<'j>(
+    sights: &Sights,
+    joints: impl Iterator<Item = &'j Articulation>,
+    grip: &Point,
+    grip_std_m: f64,
+) -> Vec<f64> {
+    let mut known: Vec<(&Articulation, f64)> = Vec::new();
+    joints
+        .map(|joint| match known.iter().find(|(other, _)| all_but_same(joint, other)) {
+            Some((_, nats)) => *nats,
+            None => {
+                let nats = agreement(sights, joint, grip, grip_std_m);
+                known.push((joint, nats));
+                nats
+            }
+        })
+        .collect()
+}
+
+/// Whether two joints differ by less than a tenth of what depth tells apart.
+fn all_but_same(a: &Articulation, b: &Articulation) -> bool {
+    const ANGLE: f64 = 0.005;
+    const OFFSET_M: f64 = 0.002;
+    a.kind == b.kind
+        && (a.axis - b.axis).norm() < ANGLE
+        && (a.kind == JointKind::Prismatic || b.line().distance(&a.origin) < OFFSET_M)
 }
 
 /// Spread of the offset that views of these sorts share, metres: that of the surest sort that there is. Views after a hand let

@@ -158,11 +158,11 @@ pub(super) fn infer(
     }
     let sights_of_part = result.face.as_ref().map(|face| sights::Sights::of(face, result.part.as_ref(), &open));
     let grip_std_m = hands::grip_std_m(trajectory.closed_end_seen());
-    let agreement: Vec<f64> = result
-        .candidates
-        .iter()
-        .map(|c| sights_of_part.as_ref().map_or(0.0, |s| sights::agreement(s, &c.joint, &region.grip, grip_std_m)))
-        .collect();
+    let joints = result.candidates.iter().map(|c| &c.joint);
+    let agreement = match &sights_of_part {
+        Some(sights) => sights::agreements(sights, joints, &region.grip, grip_std_m),
+        None => vec![0.0; result.candidates.len()],
+    };
     let answer = reasoner.answer(&Question {
         reading: &located.reading,
         words: result.words.as_ref(),

@@ -243,13 +243,11 @@ fn judged(group: &Group, reasoner: &dyn Reasoner) -> Option<Judged> {
             let contexts: Vec<(Sights, Point)> =
                 contexts.iter().map(|(f, rect, grip)| (Sights::of(f, rect.as_ref(), &open), *grip)).collect();
             let grip_std_m = hands::grip_std_m(trajectory.closed_end_seen());
-            let agreement: Vec<f64> = pooled
+            let agreement = contexts
                 .iter()
-                .map(|k| {
-                    let of = contexts.iter().map(|(s, grip)| sights::agreement(s, &k.joint, grip, grip_std_m));
-                    of.reduce(f64::max).unwrap_or(0.0)
-                })
-                .collect();
+                .map(|(s, grip)| sights::agreements(s, pooled.iter().map(|k| &k.joint), grip, grip_std_m))
+                .reduce(|best, next| best.iter().zip(&next).map(|(a, b)| a.max(*b)).collect())
+                .unwrap_or_else(|| vec![0.0; pooled.len()]);
             answers.push(reasoner.answer(&Question {
                 reading: &narration::read(&clips[c].clip),
                 words: clips[c].words.as_ref(),
