@@ -89,7 +89,8 @@ pub struct Surroundings<'a> {
 /// Fits the face that the grip stands off, oriented to the viewpoint. `None` where no plane is near the grip.
 ///
 /// A plane is the better a face the more of the surroundings lie on it, the better the grip stands off it as hands hold
-/// handles, the more the motion leaves it, and the nearer it is to upright or level and to the room's directions.
+/// handles, the more the motion leaves it, the nearer it is to upright or level and to the room's directions, and as the
+/// furniture's name has it level or not.
 #[must_use]
 pub fn fit(around: &Surroundings, config: &config::Geometry, seed: u64) -> Option<Face> {
     let grip = around.grips[0];
@@ -176,7 +177,7 @@ fn uprighted(plane: Plane, up: &Vector, near: &[Point], tolerance: f64) -> Plane
     crate::math::stats::median(&offsets).map_or(plane, |offset| Plane { normal, offset })
 }
 
-/// How likely a plane is a front that opens, whatever the points say; 1 at best.
+/// How likely a plane is a front that opens, whatever the points say: 1 at best, half of it where no name tells.
 fn face_prior(plane: &Plane, around: &Surroundings, config: &config::Geometry) -> f64 {
     let [closed, open] = around.grips;
     let standoff = (plane.height(&closed) - config.grip_standoff_m) / 0.05;
@@ -241,7 +242,7 @@ fn level_direction(plane: &Plane, around: &Surroundings) -> Option<Vector> {
         .chain(walls.take(1).map(|a| (a, WALLS_M)))
         .filter_map(|(d, weight)| Some((unit(&reject(&d, &normal))?, weight)))
         .collect();
-    // Edges of furniture are square to each other: of the sine of twice the angle only square and parallel ones have none.
+    // Edges of furniture are square to each other: the angle counts up to quarter turns, -45 to 45 degrees.
     let off = |a: &Vector, b: &Vector| {
         let (sine, cosine) = (a.cross(b).dot(&normal), a.dot(b));
         0.25 * (4.0 * sine.atan2(cosine)).sin().atan2((4.0 * sine.atan2(cosine)).cos())

@@ -255,7 +255,8 @@ fn coarse(sights: &Sights, joint: &Articulation, clip: &OpenState, views: &[Seen
         .map_or(0.0, |(_, offset)| offset)
 }
 
-/// Standard deviations to each side in which an offset is looked for: a hand that was lost may have been at the start of its way.
+/// Standard deviations to each side in which an offset is looked for: a hand that was lost, or seen to let go by a flag that
+/// erred, may have been at the start of its way.
 fn reach(hold: Hold) -> f64 {
     match hold {
         Hold::Sure => 3.0,

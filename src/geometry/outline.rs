@@ -159,6 +159,8 @@ impl CellVotes {
     pub fn vacated(&self, axis: usize, across: [f64; 2]) -> Option<f64> {
         /// Fewer seen cells in a line across the slide are noise.
         const LEAST_SEEN: usize = 4;
+        /// Lines in a row that noise may make stay.
+        const MOST_STILL: usize = 2;
         /// The strip begins at a leaf's end, near which its grip is, metres.
         const NEAR_M: f64 = 0.15;
         let count = [self.columns, self.rows][axis];
@@ -181,10 +183,16 @@ impl CellVotes {
         let line: Vec<f64> = (0..count).map(balance).collect();
         // Ends of the strip whose lines add up to most.
         let (mut best, mut strip) = (0.0, None);
-        for from in 0..count {
-            let mut sum = 0.0;
-            for to in from..count {
-                sum += line[to];
+        // It begins where a line is seen through, and ends there: what nobody saw is no part of it.
+        for from in (0..count).filter(|&i| line[i] > 0.0) {
+            let (mut sum, mut still) = (0.0, 0);
+            for (to, balance) in line.iter().enumerate().skip(from) {
+                sum += balance;
+                still = if *balance < 0.0 { still + 1 } else { 0 };
+                // Beyond so much that stayed it is another place.
+                if still > MOST_STILL {
+                    break;
+                }
                 let [low, high] = [from, to + 1].map(|i| self.origin[axis] + i as f64 * self.cell_m);
                 if sum > best && low < NEAR_M && high > -NEAR_M {
                     (best, strip) = (sum, Some(high - low));
@@ -367,5 +375,34 @@ mod tests {
         for (found, expected) in rect.bounds.iter().flatten().zip([-0.2, 0.2, -0.2, 0.54]) {
             assert!((found - expected).abs() < 0.021, "{rect:?}");
         }
+    }
+
+    #[test]
+    fn the_place_that_a_sliding_leaf_left_is_as_wide_as_it_went() {
+        let (columns, rows) = (40, 30);
+        let mut votes = votes(columns, rows);
+        votes.still.fill(2);
+        let mut free = |from: usize, to: usize| {
+            for r in 3..27 {
+                for c in from..to {
+                    votes.gone[r * columns + c] = 3;
+                }
+            }
+        };
+        // Nine cells at the grip; a wider place far from it, which another leaf left.
+        free(18, 27);
+        free(33, 40);
+        // Beside it there is no face.
+        for r in 0..rows {
+            for c in 0..18 {
+                votes.closed[r * columns + c] = 0;
+            }
+        }
+        let across = [-0.24, 0.24];
+        assert!((votes.vacated(0, across).unwrap() - 0.18).abs() < 1e-9);
+        // Of a few cells a line says nothing.
+        assert_eq!(votes.vacated(0, [0.0, 0.04]), None);
+        votes.gone.fill(0);
+        assert_eq!(votes.vacated(0, across), None);
     }
 }

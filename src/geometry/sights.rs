@@ -319,4 +319,17 @@ mod tests {
             assert!(found < if leaves { -1.0 } else { 0.0 }, "{joint:?} {found}");
         }
     }
+
+    #[test]
+    fn joints_that_depth_cannot_tell_apart_are_asked_about_once() {
+        let (out, near) = (slide(-Vector::y()), slide(Vector::new(0.003, -1.0, 0.0).normalize()));
+        let hinge = Articulation { origin: door().origin + Vector::x() * 0.001, ..door() };
+        let asked = [out, door(), near, hinge, slide(-Vector::x())];
+        let rect = drawn::rect();
+        let found = ask(&out, 0.3, 0.3, Some(&rect), |s, grip| agreements(s, asked.iter(), grip, GRIP_STD_M));
+        let alone = asked.map(|j| ask(&out, 0.3, 0.3, Some(&rect), |s, grip| agreement(s, &j, grip, GRIP_STD_M)));
+        assert_eq!([found[0], found[1], found[4]], [alone[0], alone[1], alone[4]]);
+        assert_eq!([found[2], found[3]], [found[0], found[1]]);
+        assert!(found[0] > found[1] && found[0] > found[4]);
+    }
 }

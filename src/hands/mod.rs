@@ -153,11 +153,11 @@ pub fn trajectory(
             };
             (score, side, held)
         })
-        .max_by_key(|(score, side, held)| (*score, held.len(), *side == Side::Right));
+        .max_by_key(|(score, side, held)| (*score, if *score == 0 { held.len() } else { 0 }, *side == Side::Right));
     if in_clip == 0 {
         return Outcome::Abstained("no hand was detected in the clip".to_owned());
     }
-    let Some((_, side, held)) = best.filter(|(_, _, held)| held.len() >= config.min_samples) else {
+    let Some((score, side, held)) = best.filter(|(_, _, held)| held.len() >= config.min_samples) else {
         let none = match config.min_samples {
             0 | 1 => "no hand sample".to_owned(),
             least => format!("fewer than {least} hand samples"),
@@ -166,7 +166,10 @@ pub fn trajectory(
     };
     // A blink of the detector; a hand takes as long to reach a handle.
     const SEEN_SECS: f64 = 0.35;
-    let ends_seen = {
+    // Without a flag the samples are the narration's, which knows neither end.
+    let ends_seen = if config.use_contact && score == 0 {
+        [false; 2]
+    } else {
         let time = |s: &HandSample| recording.frames[s.frame].timestamp_secs;
         let all = samples_of(side, from.saturating_sub(1), to + 1);
         let (first, last) = (held[0], held[held.len() - 1]);
@@ -353,6 +356,7 @@ mod tests {
         let found = follow("open the drawer", &config);
         let found = found.found().unwrap();
         assert_eq!((found.side, found.contact_frames()), (Some(Side::Left), [1, 4]));
+        assert_eq!(found.ends_seen, [false; 2]);
         assert!(follow("open it", &config).found().is_none());
         let strict = config::Hands { contact_from_words: false, ..config };
         assert!(follow("open the drawer", &strict).found().is_none());

@@ -82,7 +82,7 @@ pub fn localize(
     }
     let counts = voxels::count_views(&seen, config.voxel_m);
     // A grip stands off its face by a handle, and hands are estimated to a few centimetres. One that was first seen on the way
-    // is as far from where it took hold as it is uncertain.
+    // is as far from where it took hold as it is uncertain; frames of the interaction itself show the part where the hand is.
     let held = trajectory.closed_end_seen() || !config.closed_state_frames;
     let near_m = if held { NEAR_M } else { NEAR_M + 2.0 * grip_std_m(false) };
     // Fewer views than asked for where nothing reaches them: a coarse region is better than none, and it says so.

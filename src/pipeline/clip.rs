@@ -14,7 +14,7 @@ use crate::inference;
 use crate::localization::{self, Region, views};
 use crate::math::Point;
 use crate::reasoning::words::{Sight, Words};
-use crate::reasoning::{PartShape, Question, Reasoner};
+use crate::reasoning::{self, PartShape, Question, Reasoner};
 use crate::recording::narration::{self, Reading};
 use crate::recording::sketch::Sketch;
 use crate::recording::{Clip, Recording};
@@ -117,9 +117,7 @@ pub(super) fn infer(
     };
     result.words = reasoner.words(&Sight { recording, clip, region, views: &result.views, lines: &result.lines })?;
     let surface = surface(recording, region, &result.views, &seen.looks.sketches, config.localization.reach_m);
-    // Where people said "it", a model may have seen what it was.
-    let furniture =
-        located.reading.furniture.as_deref().or_else(|| result.words.as_ref().and_then(|w| w.furniture.as_deref()));
+    let furniture = reasoning::furniture(&located.reading, result.words.as_ref());
     let around = face::Surroundings {
         surface: &surface,
         grips: [region.grip, trajectory.open_grip()],
@@ -127,7 +125,7 @@ pub(super) fn infer(
         manhattan: seen.room,
         lines: &result.lines,
         up: upward(recording, seen.room),
-        level: narration::level_share(furniture, config.reasoning.name_accuracy),
+        level: narration::level_share(furniture, located.reading.strength() * config.reasoning.name_accuracy),
     };
     result.face = face::fit(&around, &config.geometry, config.seed);
 

@@ -38,9 +38,8 @@ impl Reasoner for Geometric {
             .collect();
         let name = match question.reading.kind {
             Some(kind) => {
-                // A generic word is worth half of what a name is worth.
-                let strength = if question.reading.generic { 0.5 } else { 1.0 };
-                let odds = strength * (self.reasoning.name_accuracy / (1.0 - self.reasoning.name_accuracy)).ln();
+                let odds = question.reading.strength()
+                    * (self.reasoning.name_accuracy / (1.0 - self.reasoning.name_accuracy)).ln();
                 if kind == JointKind::Revolute { odds } else { -odds }
             }
             None => 0.0,
@@ -158,7 +157,7 @@ const USUAL: Hung = Hung { upright: 0.68, bottom: 0.2, top: 0.12, lid: 0.0, out:
 
 impl Habit {
     fn of(question: &Question, trust: f64) -> Self {
-        Self { named: question.furniture().and_then(narration::hung), trust }
+        Self { named: question.furniture().and_then(narration::hung), trust: question.reading.strength() * trust }
     }
 
     /// A share of `of`, of the name's where it knows any such furniture.
@@ -172,8 +171,7 @@ impl Habit {
     /// Prior of the edge of a hinge. A lid turns about its far edge; `up` on a level face points away from the person.
     fn hinge(&self, side: HingeSide, is_lid: bool) -> f64 {
         if is_lid {
-            let far =
-                self.share(0.7, |h| h.lid, |h| if h.lid > 0.0 { h.lid + h.upright + h.bottom + h.top } else { 0.0 });
+            let far = self.share(0.7, |h| h.lid, |h| h.lid);
             return if side == HingeSide::Top { far } else { (1.0 - far) / 3.0 };
         }
         let of = |h: &Hung| h.upright + h.bottom + h.top;
@@ -191,8 +189,9 @@ impl Habit {
         match class {
             SlideClass::Out => share(|h| h.out),
             SlideClass::Aside => share(|h| h.aside),
-            SlideClass::Level => self.share(0.06, |_| 0.0, |h| h.out + h.aside + h.lift),
-            SlideClass::Askew => self.share(0.04, |_| 0.0, |h| h.out + h.aside + h.lift),
+            // Names say nothing of faces that were found wrongly.
+            SlideClass::Level => 0.06,
+            SlideClass::Askew => 0.04,
             SlideClass::Lift => share(|h| h.lift),
         }
     }
@@ -364,14 +363,17 @@ mod tests {
                 assert!((total - 1.0).abs() < 1e-9, "{h:?} {lid}");
             }
             let ways = [SlideClass::Out, SlideClass::Aside, SlideClass::Lift, SlideClass::Level, SlideClass::Askew];
-            assert!(ways.iter().map(|w| h.slide(*w)).sum::<f64>() < 1.03);
+            assert!(ways.iter().map(|w| h.slide(*w)).sum::<f64>() < 1.1);
         }
         assert!(unnamed.hinge(HingeSide::Left, false) > unnamed.hinge(HingeSide::Bottom, false));
         assert!(dishwasher.hinge(HingeSide::Bottom, false) > 0.9);
         // A drawer's name says nothing about the edges of hinges.
         assert_eq!(drawer.hinge(HingeSide::Bottom, false), unnamed.hinge(HingeSide::Bottom, false));
         assert!(drawer.slide(SlideClass::Aside) < 0.2 * unnamed.slide(SlideClass::Aside));
-        assert!(chest.hinge(HingeSide::Top, true) > unnamed.hinge(HingeSide::Top, true));
+        // What of such furniture has a lid turns about its far edge, be it rare or not.
+        for lid in [chest, habit(Some("freezer"))] {
+            assert!(lid.hinge(HingeSide::Top, true) > unnamed.hinge(HingeSide::Top, true));
+        }
     }
 
     #[test]

@@ -43,11 +43,17 @@ pub struct Question<'a> {
 }
 
 impl Question<'_> {
-    /// The furniture's name: the narration's; where people said "it", a language model's.
+    /// See [`furniture`].
     #[must_use]
     pub fn furniture(&self) -> Option<&str> {
-        self.reading.furniture.as_deref().or_else(|| self.words?.furniture.as_deref())
+        furniture(self.reading, self.words)
     }
+}
+
+/// The furniture's name: the narration's; where people said "it", what a language model saw.
+#[must_use]
+pub fn furniture<'a>(reading: &'a Reading, words: Option<&'a words::Words>) -> Option<&'a str> {
+    reading.furniture.as_deref().or_else(|| words?.furniture.as_deref())
 }
 
 /// Shape of the moving part's front and where it is held.

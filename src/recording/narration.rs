@@ -65,11 +65,11 @@ pub fn hung(furniture: &str) -> Option<Hung> {
     LEXICON.hung.iter().find(|habit| habit.names.iter().any(said)).map(|habit| habit.ways)
 }
 
-/// Share of the furniture of a name whose moving face is level, where names are right in a share `accuracy`; one half where
-/// nothing is known.
+/// Share of the furniture of a name whose moving face is level, where the name is trusted in a share `trust` of all cases; one
+/// half where nothing is known.
 #[must_use]
-pub fn level_share(furniture: Option<&str>, accuracy: f64) -> f64 {
-    furniture.and_then(hung).map_or(0.5, |h| accuracy * h.lid + (1.0 - accuracy) * 0.5)
+pub fn level_share(furniture: Option<&str>, trust: f64) -> f64 {
+    furniture.and_then(hung).map_or(0.5, |h| trust * h.lid + (1.0 - trust) * 0.5)
 }
 
 /// What the words say. `None` where they say nothing.
@@ -88,6 +88,12 @@ pub struct Reading {
 }
 
 impl Reading {
+    /// What its words are worth: "door", said of whatever opens, half of what a name is.
+    #[must_use]
+    pub fn strength(&self) -> f64 {
+        if self.generic { 0.5 } else { 1.0 }
+    }
+
     /// Whether they name a piece of furniture that opens, rather than "door" or "it".
     #[must_use]
     pub fn names_furniture(&self) -> bool {

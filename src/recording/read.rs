@@ -424,8 +424,8 @@ fn check_hands(hands: &[HandSample], frames: &[Frame], faults: &mut Faults) {
     if !hands.iter().any(|s| s.contact) {
         faults.add(
             "contact",
-            "hands: no sample is in contact; run a contact detector and fill \"contact\", or set \
-             hands.use_contact = false in the config to use every sample"
+            "hands: no sample is in contact; run a contact detector and fill \"contact\"; true in every sample means that \
+             nobody knows, and goes with hands.use_contact = false in the config"
                 .to_owned(),
         );
     }

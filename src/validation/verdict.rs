@@ -258,7 +258,7 @@ fn held_out(joint: &Articulation, clips: &[Evidence], i: usize) -> Option<f64> {
 ///
 /// **Undetermined**, else, where there is no hand, where the tracking error is above `pass_rms_m`, or where the best rival is
 /// within `margin_nats`: a motion too small for its noise cannot tell them apart. As rivals stand `rival_shift_m` beside a
-/// hinge, what passes is at least known to that. And where the joint's own log odds, after hand, depth and words, are below
+/// hinge, what passes is at least known to that. And where the joint's own log odds, after hand, depth, words and physics, are below
 /// `margin_nats`: a hand alone follows some joints that depth speaks against.
 ///
 /// **Pass** else.
@@ -321,7 +321,7 @@ fn judge(
         (Verdict::Undetermined, text)
     } else if let Some(p) = part.joint.probability.filter(|p| log_odds(*p) < config.margin_nats) {
         let text = format!(
-            "follows the recorded hand to {}, but depth and shape leave other joints a share of {:.0} %",
+            "follows the recorded hand to {}, but after all evidence other joints keep a share of {:.0} %",
             centimetres(rms_m),
             100.0 * (1.0 - p)
         );
@@ -349,9 +349,12 @@ fn judge(
     }
 }
 
-/// Log odds of a probability, nats; finite.
+/// Log odds of a probability, nats; finite, and minus infinity for what is no number.
 #[must_use]
 pub fn log_odds(probability: f64) -> f64 {
+    if probability.is_nan() {
+        return f64::NEG_INFINITY;
+    }
     let p = probability.clamp(1e-12, 1.0 - 1e-12);
     (p / (1.0 - p)).ln()
 }
