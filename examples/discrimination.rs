@@ -8,7 +8,8 @@
 //! one, whatever joint is tried in it. Told are the shares of each verdict and the area under the ROC (AUC) of two scores:
 //! the tracking error, and the margin over the best rival.
 //!
-//! With `--answers DIR... --truth RECORDING...` the same for what `paws twin` answered, right or wrong.
+//! With `--answers DIR... --truth RECORDING...` the same for what `paws twin` answered, right or wrong. There the margin is
+//! what the verdict rests on: the lesser of that over the best rival and the answer's own log odds.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;

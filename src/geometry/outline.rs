@@ -181,9 +181,9 @@ impl CellVotes {
             if seen < LEAST_SEEN { 0.0 } else { 2.0 * gone as f64 / seen as f64 - 1.0 }
         };
         let line: Vec<f64> = (0..count).map(balance).collect();
-        // Ends of the strip whose lines add up to most.
+        // Of all stretches the one whose lines add up to most. It begins and ends where a line is seen through: what nobody saw
+        // is no part of it.
         let (mut best, mut strip) = (0.0, None);
-        // It begins where a line is seen through, and ends there: what nobody saw is no part of it.
         for from in (0..count).filter(|&i| line[i] > 0.0) {
             let (mut sum, mut still) = (0.0, 0);
             for (to, balance) in line.iter().enumerate().skip(from) {

@@ -8,12 +8,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 
 use super::glb::Scene;
+use super::masses::masses;
 use super::places::{animations, places, same_places};
 use super::sweep::sweep;
-use super::{Format, Kind, Link, MassSource, Model, ModelJoint, Shape, Tree};
+use super::{Format, Kind, Model, ModelJoint, Shape, Tree};
 use crate::articulation::JointKind;
-use crate::math::{self, Vector, unit};
-use crate::twin::{Twin, mass_properties};
+use crate::math::{self, unit};
+use crate::twin::Twin;
 
 /// What a file says to a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -55,10 +56,6 @@ pub const POINTS: [(u8, &str); 9] = [
     (11, "sweep: no penetration over each range, a millimetre free when closed"),
 ];
 
-/// Less is a hair, not a part.
-const MIN_MASS_KG: f64 = 0.05;
-/// More is a wall.
-const MAX_MASS_KG: f64 = 200.0;
 /// A hinge that opens by less has, as a rule, radians that were read as degrees: half a turn, taken so.
 const MIN_HINGE_RAD: f64 = 0.056;
 /// Longer slides are millimetres that were taken for metres.
@@ -273,91 +270,6 @@ fn falls_out(said: &mut Said, model: &Model, tree: &Tree, joint: usize, travel: 
     }
 }
 
-fn masses(model: &Model, tree: Option<&Tree>, twin: Option<&Twin>) -> Said {
-    let moving: BTreeSet<&str> = model.moving().map(|(_, j)| j.child.as_str()).collect();
-    // A wall may weigh what it likes; what moves, and what carries it, is furniture.
-    let furniture: BTreeSet<&str> = model.moving().flat_map(|(_, j)| [j.child.as_str(), j.parent.as_str()]).collect();
-    let mut said = Said::about(false);
-    let root = tree.and_then(|t| t.order.first().copied());
-    for (i, link) in model.links.iter().enumerate() {
-        let name = &link.name;
-        let bare = link.shapes.is_empty() && link.meshes.is_empty();
-        let frame_only = bare && link.mass_source == MassSource::Nothing && !moving.contains(name.as_str());
-        // What stands in the world and never moves needs no mass; a link of the world's name is no body.
-        if link.between || frame_only || (Some(i) == root && name == super::mjcf::WORLD) {
-            continue;
-        }
-        said.concerned = true;
-        match (link.mass_source, link.mass) {
-            (MassSource::Nothing, _) => said.fault(format!("{name}: no <inertial>; write mass, centre and inertia")),
-            (MassSource::Assumed, _) => said.fault(format!(
-                "{name}: neither <inertial>, mass nor density is written; MuJoCo takes it to be as heavy as water"
-            )),
-            (MassSource::Stated, None) => said.fault(format!("{name}: its <inertial> has no mass")),
-            (MassSource::Shapes, None) => {
-                said.tell(format!("{name}: its mass comes from a mesh and is not worked out here"));
-            }
-            (MassSource::Stated | MassSource::Shapes, Some(mass)) => {
-                mass_of(&mut said, link, mass, furniture.contains(name.as_str()));
-            }
-        }
-    }
-    if let Some(twin) = twin {
-        let bodies = twin.furniture.iter().flat_map(|f| {
-            [(f.name.clone(), f.carcass.as_slice()), (format!("{}_link", f.part.id), f.part.solids.as_slice())]
-        });
-        for (name, solids) in bodies {
-            let Some(wanted) = mass_properties(solids, twin.density_kg_per_m3) else { continue };
-            let have = model.links.iter().find(|l| l.name == name).and_then(|l| l.mass);
-            // Density times volume to a thousandth.
-            if !have.is_some_and(|m| (m - wanted.mass).abs() <= 1e-3 * wanted.mass) {
-                let have = have.map_or_else(|| "none".to_owned(), |m| format!("{m:.4} kg"));
-                said.fault(format!("{name}: mass {have}; density times volume is {:.4} kg", wanted.mass));
-            }
-        }
-    }
-    said
-}
-
-fn mass_of(said: &mut Said, link: &Link, mass: f64, is_furniture: bool) {
-    let name = &link.name;
-    if !(MIN_MASS_KG..=MAX_MASS_KG).contains(&mass) && (is_furniture || mass.is_nan() || mass <= 0.0) {
-        said.fault(format!("{name}: {mass} kg; furniture's parts weigh {MIN_MASS_KG} to {MAX_MASS_KG} kg"));
-    }
-    // Above every body, and where eigenvalues are no numbers any more.
-    const MAX_MOMENT: f64 = 1e9;
-    if !link.inertia.iter().all(|x| x.abs() < MAX_MOMENT) {
-        said.fault(format!("{name}: its moments of inertia are beyond any body's"));
-        return;
-    }
-    let mut moments: Vec<f64> = link.inertia.symmetric_eigenvalues().iter().copied().collect();
-    moments.sort_by(f64::total_cmp);
-    let told: Vec<String> = moments.iter().map(|m| format!("{m:.3e}")).collect();
-    let told = told.join(", ");
-    if let [a, b, c] = moments[..] {
-        if a <= 0.0 {
-            said.fault(format!("{name}: moments of inertia {told} kg m^2 must be positive"));
-        } else if a + b < c * (1.0 - 1e-9) {
-            said.fault(format!(
-                "{name}: no body has moments of inertia {told} kg m^2: none may exceed the sum of the others; work the \
-                 tensor out again"
-            ));
-        }
-    }
-    if link.shapes.is_empty() || link.incomplete {
-        return;
-    }
-    let corners: Vec<Vector> = link.shapes.iter().flat_map(|s| s.bounds.corners()).map(|p| p.coords).collect();
-    let (mut low, mut high) = (corners[0], corners[0]);
-    for c in &corners {
-        (low, high) = (low.inf(c), high.sup(c));
-    }
-    let outside = (0..3).map(|k| (low[k] - link.center[k]).max(link.center[k] - high[k])).fold(0.0, f64::max);
-    if outside > 1e-6 {
-        said.fault(format!("{name}: its centre of mass lies {:.1} mm outside its boxes", 1000.0 * outside));
-    }
-}
-
 fn base(model: &Model, tree: &Tree) -> Said {
     let mut said = Said::about(true);
     if let (Format::Urdf { keeps_links, .. }, Some(root)) = (&model.format, tree.order.first()) {
@@ -522,8 +434,10 @@ mod tests {
 
     use nalgebra::Matrix3;
 
+    use super::super::{Link, MassSource};
     use super::*;
     use crate::math::Pose;
+    use crate::math::Vector;
     use crate::twin::OrientedBox;
 
     fn cabinet() -> Model {

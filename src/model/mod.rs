@@ -7,6 +7,7 @@
 pub mod check;
 pub mod furniture;
 pub mod glb;
+mod masses;
 mod mesh;
 pub mod mjcf;
 mod mjcf_context;

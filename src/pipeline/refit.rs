@@ -77,8 +77,7 @@ pub(super) fn refitted<'a>(
         .collect();
     let ends = left_where_found(shown, &ends);
     let ranges = ends.iter().map(|end| end.value.max(0.0)).collect();
-    // The views share a hand, a depth estimate and an outline: their covariances, which take
-    // them for independent, are too small.
+    // The views share a hand, a depth estimate and an outline: covariances that take them for independent are too small.
     let shared = config.inference.shared_errors;
     let depth = OpenStates {
         across: fit.across,

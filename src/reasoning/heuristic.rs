@@ -157,7 +157,10 @@ const USUAL: Hung = Hung { upright: 0.68, bottom: 0.2, top: 0.12, lid: 0.0, out:
 
 impl Habit {
     fn of(question: &Question, trust: f64) -> Self {
-        Self { named: question.furniture().and_then(narration::hung), trust: question.reading.strength() * trust }
+        Self {
+            named: super::furniture(question.reading, question.words).and_then(narration::hung),
+            trust: question.reading.strength() * trust,
+        }
     }
 
     /// A share of `of`, of the name's where it knows any such furniture.

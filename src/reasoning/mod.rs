@@ -42,14 +42,6 @@ pub struct Question<'a> {
     pub up: Vector,
 }
 
-impl Question<'_> {
-    /// See [`furniture`].
-    #[must_use]
-    pub fn furniture(&self) -> Option<&str> {
-        furniture(self.reading, self.words)
-    }
-}
-
 /// The furniture's name: the narration's; where people said "it", what a language model saw.
 #[must_use]
 pub fn furniture<'a>(reading: &'a Reading, words: Option<&'a words::Words>) -> Option<&'a str> {
