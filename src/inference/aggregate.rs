@@ -9,7 +9,7 @@ use crate::math::{Point, Vector, signed_angle, unsigned_angle};
 
 /// What tells whether two clips show one part.
 #[derive(Debug, Clone, Copy)]
-pub struct Held {
+pub struct Held<'a> {
     /// Opening or closing.
     pub action: Action,
     /// The grip at the closed and the open end, as far as the hand was seen.
@@ -18,7 +18,11 @@ pub struct Held {
     pub open: Point,
     /// Outward normal of the touched face, where one was found.
     pub normal: Option<Vector>,
-    /// What the furniture's name says about the type.
+    /// The hand's way, world.
+    pub path: &'a [Point],
+    /// The furniture's name, where the narration has one.
+    pub furniture: Option<&'a str>,
+    /// What that name says about the type.
     pub kind: Option<JointKind>,
     /// The face and the part of it that moved, where it was seen.
     pub part: Option<(Face, Rect)>,
@@ -28,8 +32,8 @@ pub struct Held {
 
 /// Groups clips that show one part, given in the order of time. Returns indices into `clips`.
 ///
-/// Two clips belong together if the grip was at the same place of the same face when closed; or if one closes what the one
-/// before it opened: people take hold of a part where they left it.
+/// Two clips belong together if the grip was at the same place of the same face when closed; or if one closes what the other
+/// left open: people take hold of a part where they left it, and what is closed was open.
 #[must_use]
 pub fn group(clips: &[Held], config: &config::Inference) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
@@ -41,18 +45,46 @@ pub fn group(clips: &[Held], config: &config::Inference) -> Vec<Vec<usize>> {
         let continues = |g: &Vec<usize>| g.last() == Some(&i.wrapping_sub(1)) && closes(&clips[i - 1], clip, config);
         let distance =
             |g: &Vec<usize>| g.iter().map(|&j| (clips[j].closed - clip.closed).norm()).fold(f64::INFINITY, f64::min);
-        let home = match groups.iter().position(continues) {
-            Some(home) => Some(home),
-            None => (0..groups.len())
-                .filter(|&g| groups[g].iter().any(|&j| same_place(&clips[j], clip, config)))
-                .min_by(|&a, &b| distance(&groups[a]).total_cmp(&distance(&groups[b]))),
-        };
+        let same = |g: &usize| groups[*g].iter().any(|&j| same_place(&clips[j], clip, config));
+        let home = groups.iter().position(continues).or_else(|| only_one_open(&groups, clips, i, config)).or_else(|| {
+            let nearest = |a: &usize, b: &usize| distance(&groups[*a]).total_cmp(&distance(&groups[*b]));
+            (0..groups.len()).filter(same).min_by(nearest)
+        });
         match home {
             Some(home) => groups[home].push(i),
             None => groups.push(vec![i]),
         }
     }
     groups
+}
+
+/// The part that clip `i` closes because no other of its name stands open within reach of the hand's way. Hands that were seen
+/// badly or in part only are far apart even on one part; what was left open decides then. Where the furniture has no name,
+/// only the clip before counts.
+fn only_one_open(groups: &[Vec<usize>], clips: &[Held], i: usize, config: &config::Inference) -> Option<usize> {
+    let clip = &clips[i];
+    if clip.action != Action::Close {
+        return None;
+    }
+    let mut open = (0..groups.len()).filter(|&g| {
+        groups[g].last().is_some_and(|&j| {
+            let before = &clips[j];
+            let named = match (before.furniture, clip.furniture) {
+                (Some(a), Some(b)) => a == b,
+                _ => j + 1 == i,
+            };
+            before.action == Action::Open
+                && named
+                && names_agree(before, clip)
+                && apart(before.path, clip.path) <= config.merge_open_m
+        })
+    });
+    open.next().filter(|_| open.next().is_none())
+}
+
+/// Shortest distance between the points of two paths; infinite where one has none.
+fn apart(a: &[Point], b: &[Point]) -> f64 {
+    a.iter().flat_map(|p| b.iter().map(move |q| (p - q).norm())).fold(f64::INFINITY, f64::min)
 }
 
 fn names_agree(a: &Held, b: &Held) -> bool {
@@ -152,9 +184,10 @@ mod tests {
         assert!(merged.line().distance(&Point::origin()) < 2e-3, "{merged:?}");
     }
 
-    fn held(action: Action, closed: [f64; 3], open: [f64; 3]) -> Held {
+    fn held(action: Action, closed: [f64; 3], open: [f64; 3]) -> Held<'static> {
         let (closed, open) = (Point::from(closed), Point::from(open));
-        Held { action, closed, open, normal: Some(Vector::y()), kind: None, part: None, joint: None }
+        let normal = Some(Vector::y());
+        Held { action, closed, open, normal, path: &[], furniture: None, kind: None, part: None, joint: None }
     }
 
     #[test]
@@ -175,5 +208,32 @@ mod tests {
             held(Action::Close, [0.25, 0.3, 0.7], [0.31, 0.42, 0.72]),
         ];
         assert_eq!(group(&clips, &config::Inference::default()), [vec![0, 1]]);
+    }
+
+    #[test]
+    fn what_is_closed_is_what_stands_open() {
+        let at = |x: f64| vec![Point::new(x, 0.0, 0.7), Point::new(x, 0.3, 0.7)];
+        let (here, near, far) = (at(0.0), at(0.25), at(3.0));
+        let drawer = |action, path: &'static [Point]| {
+            let [closed, open] = [path[0], path[1]].map(|p| p.coords.into());
+            Held { path, furniture: Some("drawer"), ..held(action, closed, open) }
+        };
+        let [here, near, far] = [here, near, far].map(|p| &*p.leak());
+        let config = config::Inference::default();
+        // Seen 25 cm apart, with another drawer opened in between.
+        let clips = [drawer(Action::Open, here), drawer(Action::Open, far), drawer(Action::Close, near)];
+        assert_eq!(group(&clips, &config), [vec![0, 2], vec![1]]);
+        // Two stand open: the distance alone does not tell.
+        let clips = [drawer(Action::Open, here), drawer(Action::Open, at(0.5).leak()), drawer(Action::Close, near)];
+        assert_eq!(group(&clips, &config).len(), 3);
+        // Closed already, and another name.
+        let closed = drawer(Action::Close, here);
+        assert_eq!(group(&[drawer(Action::Open, here), closed, drawer(Action::Close, near)], &config).len(), 2);
+        let oven = Held { furniture: Some("oven"), ..drawer(Action::Close, near) };
+        assert_eq!(group(&[drawer(Action::Open, here), oven], &config).len(), 2);
+        // Without a name, right after it only.
+        let it = Held { furniture: None, ..drawer(Action::Close, near) };
+        assert_eq!(group(&[drawer(Action::Open, here), it], &config).len(), 1);
+        assert_eq!(group(&[drawer(Action::Open, here), drawer(Action::Open, far), it], &config).len(), 3);
     }
 }

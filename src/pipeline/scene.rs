@@ -33,14 +33,22 @@ pub(super) fn merge(
         clips.iter().enumerate().filter_map(|(i, c)| c.trajectory.as_ref().map(|t| (i, c, t))).collect();
     // Clips may be listed in any order; people open before they close.
     seen.sort_by_key(|(i, c, _)| (c.clip.start_frame, *i));
+    let paths: Vec<Vec<Point>> = seen.iter().map(|(.., trajectory)| trajectory.positions()).collect();
+    let named: Vec<Option<narration::Reading>> = seen
+        .iter()
+        .map(|(_, clip, _)| Some(narration::read(&clip.clip)).filter(narration::Reading::names_furniture))
+        .collect();
     let held: Vec<aggregate::Held> = seen
         .iter()
-        .map(|(_, clip, trajectory)| aggregate::Held {
+        .zip(paths.iter().zip(&named))
+        .map(|((_, clip, trajectory), (path, named))| aggregate::Held {
             action: trajectory.action,
             closed: trajectory.closed_grip(),
             open: trajectory.open_grip(),
             normal: clip.face.map(|f| f.normal),
-            kind: Some(narration::read(&clip.clip)).filter(narration::Reading::names_furniture).and_then(|r| r.kind),
+            path,
+            furniture: named.as_ref().and_then(|r| r.furniture.as_deref()),
+            kind: named.as_ref().and_then(|r| r.kind),
             part: clip.face.zip(clip.part),
             joint: clip.joint.found().filter(|j| j.type_probability > 0.7).map(|j| j.joint),
         })
