@@ -46,10 +46,11 @@ pub fn group(clips: &[Held], config: &config::Inference) -> Vec<Vec<usize>> {
         let distance =
             |g: &Vec<usize>| g.iter().map(|&j| (clips[j].closed - clip.closed).norm()).fold(f64::INFINITY, f64::min);
         let same = |g: &usize| groups[*g].iter().any(|&j| same_place(&clips[j], clip, config));
-        let home = groups.iter().position(continues).or_else(|| only_one_open(&groups, clips, i, config)).or_else(|| {
-            let nearest = |a: &usize, b: &usize| distance(&groups[*a]).total_cmp(&distance(&groups[*b]));
-            (0..groups.len()).filter(same).min_by(nearest)
-        });
+        let home =
+            groups.iter().position(continues).or_else(|| only_one_open(&groups, clips, i, config)).or_else(|| {
+                let nearest = |a: &usize, b: &usize| distance(&groups[*a]).total_cmp(&distance(&groups[*b]));
+                (0..groups.len()).filter(same).min_by(nearest)
+            });
         match home {
             Some(home) => groups[home].push(i),
             None => groups.push(vec![i]),
@@ -113,14 +114,68 @@ fn same_place(a: &Held, b: &Held, config: &config::Inference) -> bool {
 /// Handles of neighbours can be a hand's width apart; the parts behind them do not overlap. An outline that was seen badly
 /// is too large rather than elsewhere, so the overlap is measured against the smaller one.
 fn outlines_agree(a: &Held, b: &Held) -> bool {
-    const LEAST_SHARE: f64 = 0.5;
     let (Some((face, mine)), Some((other_face, theirs))) = (&a.part, &b.part) else { return true };
+    overlap(face, mine, other_face, theirs)
+}
+
+/// Whether half of the smaller outline lies on the larger one.
+fn overlap(face: &Face, mine: &Rect, other_face: &Face, theirs: &Rect) -> bool {
+    const LEAST_SHARE: f64 = 0.5;
     let [right, up, _] = face.coordinates(&other_face.center);
     let theirs = [theirs.bounds[0].map(|x| x + right), theirs.bounds[1].map(|x| x + up)];
     let overlap: f64 =
         (0..2).map(|k| (mine.bounds[k][1].min(theirs[k][1]) - mine.bounds[k][0].max(theirs[k][0])).max(0.0)).product();
     let area = |b: &[[f64; 2]; 2]| (b[0][1] - b[0][0]) * (b[1][1] - b[1][0]);
     overlap >= LEAST_SHARE * area(&mine.bounds).min(area(&theirs))
+}
+
+/// What the clips of one group say of the closed part.
+#[derive(Debug, Clone, Copy)]
+pub struct Front {
+    /// Its face.
+    pub face: Face,
+    /// Its outline on the face.
+    pub rect: Rect,
+    /// Where it was held, world.
+    pub grip: Point,
+}
+
+/// Which of the groups are one part after all: no two parts cover the same piece of a face. Indices into `fronts`, each group
+/// with those that join it, in order.
+#[must_use]
+pub fn same_fronts(fronts: &[Option<Front>], config: &config::Inference) -> Vec<Vec<usize>> {
+    let mut sets: Vec<Vec<usize>> = Vec::new();
+    for (i, front) in fronts.iter().enumerate() {
+        let meets = |&j: &usize| {
+            front.zip(fronts[j]).is_some_and(|(a, b)| config.merge_clips && cover_one_place(&a, &b, config))
+        };
+        let (mut joined, apart): (Vec<Vec<usize>>, _) = sets.into_iter().partition(|set| set.iter().any(meets));
+        joined.push(vec![i]);
+        let mut set = joined.concat();
+        set.sort_unstable();
+        sets = apart;
+        sets.push(set);
+    }
+    sets.sort();
+    sets
+}
+
+/// Both outlines overlap and each contains the other's grip: one that was seen badly may reach over a neighbour, which then is
+/// held outside of it. What lies deeper is another part, as a drawer behind a door.
+fn cover_one_place(a: &Front, b: &Front, config: &config::Inference) -> bool {
+    /// Of the faces, along the normal; two planes fitted to depth differ by a few centimetres.
+    const DEEPER_M: f64 = 0.08;
+    /// Grips are known this well at best.
+    const GRIP_M: f64 = 0.05;
+    let holds = |on: &Front, grip: &Point| {
+        let at = on.face.coordinates(grip);
+        (0..2).all(|k| at[k] >= on.rect.bounds[k][0] - GRIP_M && at[k] <= on.rect.bounds[k][1] + GRIP_M)
+    };
+    signed_angle(&a.face.normal, &b.face.normal) <= config.merge_angle_deg.to_radians()
+        && a.face.coordinates(&b.face.center)[2].abs() <= DEEPER_M
+        && holds(a, &b.grip)
+        && holds(b, &a.grip)
+        && overlap(&a.face, &a.rect, &b.face, &b.rect)
 }
 
 /// Two doors side by side are hinged at their outer edges: both hinges are sure and far apart.
@@ -235,5 +290,34 @@ mod tests {
         let it = Held { furniture: None, ..drawer(Action::Close, near) };
         assert_eq!(group(&[drawer(Action::Open, here), it], &config).len(), 1);
         assert_eq!(group(&[drawer(Action::Open, here), drawer(Action::Open, far), it], &config).len(), 3);
+    }
+
+    #[test]
+    fn no_two_parts_cover_one_piece_of_a_face() {
+        let face = |depth: f64| Face {
+            center: Point::new(0.0, depth, 0.5),
+            normal: Vector::y(),
+            up: Vector::z(),
+            right: -Vector::x(),
+            extent: [[-1.0, 1.0]; 2],
+            support: 1.0,
+        };
+        let front = |depth: f64, [left, right]: [f64; 2], [low, high]: [f64; 2], grip: [f64; 2]| {
+            let face = face(depth);
+            let grip = face.center + face.right * grip[0] + face.up * grip[1];
+            Some(Front { face, rect: Rect { bounds: [[left, right], [low, high]] }, grip })
+        };
+        let config = config::Inference::default();
+        let drawer = front(0.0, [-0.3, 0.3], [-0.1, 0.1], [0.0, 0.05]);
+        let again = front(0.02, [-0.25, 0.3], [-0.1, 0.1], [0.05, 0.0]);
+        let below = front(0.0, [-0.3, 0.3], [-0.3, -0.1], [0.0, -0.2]);
+        // Seen to reach over the one below.
+        let tall = front(0.0, [-0.3, 0.3], [-0.3, 0.1], [0.0, 0.05]);
+        // Behind a door.
+        let inner = front(-0.15, [-0.3, 0.3], [-0.1, 0.1], [0.0, 0.0]);
+        assert_eq!(same_fronts(&[drawer, below, None, again], &config), [vec![0, 3], vec![1], vec![2]]);
+        assert_eq!(same_fronts(&[tall, below, inner], &config), [vec![0], vec![1], vec![2]]);
+        let apart = config::Inference { merge_clips: false, ..config };
+        assert_eq!(same_fronts(&[drawer, again], &apart).len(), 2);
     }
 }

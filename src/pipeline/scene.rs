@@ -58,15 +58,53 @@ pub(super) fn merge(
         .map(|g| g.into_iter().map(|i| seen[i].0).collect::<Vec<usize>>())
         .filter(|g| g.iter().any(|&c| clips[c].joint.found().is_some()))
         .collect();
-    let merged: Vec<Option<SceneJoint>> = groups
-        .par_iter()
-        .map(|members| merge_group(&Group { recording, sketches, clips, members, config }, reasoner))
-        .collect();
-    let mut joints: Vec<SceneJoint> = merged.into_iter().flatten().collect();
+    let mut joints = merged(recording, sketches, clips, &groups, reasoner, config);
+    // Outlines are known better once all clips of a part were judged together: groups may turn out to be one.
+    loop {
+        let fronts: Vec<Option<aggregate::Front>> = joints
+            .iter()
+            .map(|(_, j)| j.face.zip(j.part).map(|(face, rect)| aggregate::Front { face, rect, grip: j.grip }))
+            .collect();
+        let sets = aggregate::same_fronts(&fronts, &config.inference);
+        if sets.len() == joints.len() {
+            break;
+        }
+        let (old, new): (Vec<_>, Vec<_>) = sets.into_iter().partition(|set| set.len() == 1);
+        let groups: Vec<Vec<usize>> = new
+            .iter()
+            .map(|set| {
+                let mut members: Vec<usize> = set.iter().flat_map(|&j| joints[j].0.iter().copied()).collect();
+                members.sort_by_key(|&c| (clips[c].clip.start_frame, c));
+                members
+            })
+            .collect();
+        let again = merged(recording, sketches, clips, &groups, reasoner, config);
+        joints = old.iter().flatten().map(|&j| joints[j].clone()).chain(again).collect();
+        joints.sort_by_key(|(members, _)| members.first().map(|&c| (clips[c].clip.start_frame, c)));
+    }
+    let mut joints: Vec<SceneJoint> = joints.into_iter().map(|(_, joint)| joint).collect();
     for (i, joint) in joints.iter_mut().enumerate() {
         joint.id = format!("joint_{i}");
     }
     joints
+}
+
+/// The groups that have a joint, and it.
+fn merged(
+    recording: &Recording,
+    sketches: &BTreeMap<usize, Sketch>,
+    clips: &[ClipResult],
+    groups: &[Vec<usize>],
+    reasoner: &dyn Reasoner,
+    config: &Config,
+) -> Vec<(Vec<usize>, SceneJoint)> {
+    groups
+        .par_iter()
+        .filter_map(|members| {
+            let joint = merge_group(&Group { recording, sketches, clips, members, config }, reasoner)?;
+            Some((members.clone(), joint))
+        })
+        .collect()
 }
 
 /// The candidates of all clips of a part as far as they fit the face of the clip that saw it best.
