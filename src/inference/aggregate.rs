@@ -115,18 +115,28 @@ fn same_place(a: &Held, b: &Held, config: &config::Inference) -> bool {
 /// is too large rather than elsewhere, so the overlap is measured against the smaller one.
 fn outlines_agree(a: &Held, b: &Held) -> bool {
     let (Some((face, mine)), Some((other_face, theirs))) = (&a.part, &b.part) else { return true };
-    overlap(face, mine, other_face, theirs)
+    let shared = shared((face, mine), (other_face, theirs));
+    shared.of_smaller >= LEAST_SHARE
 }
 
-/// Whether half of the smaller outline lies on the larger one.
-fn overlap(face: &Face, mine: &Rect, other_face: &Face, theirs: &Rect) -> bool {
-    const LEAST_SHARE: f64 = 0.5;
+/// Of the smaller outline, on the larger one.
+const LEAST_SHARE: f64 = 0.5;
+
+/// How far two outlines overlap.
+struct Shared {
+    /// Share of the smaller one that lies on the larger one.
+    of_smaller: f64,
+    /// Intersection over union.
+    iou: f64,
+}
+
+fn shared((face, mine): (&Face, &Rect), (other_face, theirs): (&Face, &Rect)) -> Shared {
     let [right, up, _] = face.coordinates(&other_face.center);
     let theirs = [theirs.bounds[0].map(|x| x + right), theirs.bounds[1].map(|x| x + up)];
-    let overlap: f64 =
+    let both: f64 =
         (0..2).map(|k| (mine.bounds[k][1].min(theirs[k][1]) - mine.bounds[k][0].max(theirs[k][0])).max(0.0)).product();
-    let area = |b: &[[f64; 2]; 2]| (b[0][1] - b[0][0]) * (b[1][1] - b[1][0]);
-    overlap >= LEAST_SHARE * area(&mine.bounds).min(area(&theirs))
+    let [a, b] = [mine.bounds, theirs].map(|b| (b[0][1] - b[0][0]) * (b[1][1] - b[1][0]));
+    Shared { of_smaller: both / a.min(b), iou: both / (a + b - both) }
 }
 
 /// What the clips of one group say of the closed part.
@@ -160,22 +170,23 @@ pub fn same_fronts(fronts: &[Option<Front>], config: &config::Inference) -> Vec<
     sets
 }
 
-/// Both outlines overlap and each contains the other's grip: one that was seen badly may reach over a neighbour, which then is
-/// held outside of it. What lies deeper is another part, as a drawer behind a door.
+/// Both outlines are nearly one; or they overlap and each contains the other's grip: one that was seen badly may reach over a
+/// neighbour, which then is held outside of it. What lies deeper is another part, as a drawer behind a door.
 fn cover_one_place(a: &Front, b: &Front, config: &config::Inference) -> bool {
     /// Of the faces, along the normal; two planes fitted to depth differ by a few centimetres.
     const DEEPER_M: f64 = 0.08;
     /// Grips are known this well at best.
     const GRIP_M: f64 = 0.05;
+    /// Two drawers of one size seen as one share half of their union with each of them.
+    const NEARLY_ONE: f64 = 0.6;
     let holds = |on: &Front, grip: &Point| {
         let at = on.face.coordinates(grip);
         (0..2).all(|k| at[k] >= on.rect.bounds[k][0] - GRIP_M && at[k] <= on.rect.bounds[k][1] + GRIP_M)
     };
+    let shared = shared((&a.face, &a.rect), (&b.face, &b.rect));
     signed_angle(&a.face.normal, &b.face.normal) <= config.merge_angle_deg.to_radians()
         && a.face.coordinates(&b.face.center)[2].abs() <= DEEPER_M
-        && holds(a, &b.grip)
-        && holds(b, &a.grip)
-        && overlap(&a.face, &a.rect, &b.face, &b.rect)
+        && (shared.iou >= NEARLY_ONE || (shared.of_smaller >= LEAST_SHARE && holds(a, &b.grip) && holds(b, &a.grip)))
 }
 
 /// Two doors side by side are hinged at their outer edges: both hinges are sure and far apart.
