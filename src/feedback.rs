@@ -281,7 +281,9 @@ mod tests {
 
     fn hypothesis(joint: Articulation, share: f64, type_share: f64, moved: f64) -> Hypothesis {
         let part = Some(Rect { bounds: [[-0.5, 0.06], [-0.3, 0.1]] });
-        Hypothesis { joint, share, type_share, uncertainty: None, part, moved: vec![moved], refuted: None }
+        let uncertainty = None;
+        let observed_range = moved;
+        Hypothesis { joint, share, type_share, uncertainty, part, observed_range, moved: vec![moved], refuted: None }
     }
 
     /// A front of 56 x 40 cm in the plane y = 0, seen from -y: a drawer, or a door hinged on the left at x = -0.3.

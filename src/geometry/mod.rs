@@ -1,5 +1,6 @@
 //! Static geometry: 3D lines for hinges, directions for slides, and the touched front face (§3.2, algorithm 1, §A.4, §A.5).
 
+pub mod ajar;
 pub mod candidates;
 pub mod depth_scale;
 pub mod detector;

@@ -159,9 +159,15 @@ pub fn open_views<'a>(
     clip: &Clip,
     trajectory: &Trajectory,
 ) -> Vec<View<'a>> {
-    open_frames(recording, clip, trajectory)
-        .into_iter()
-        .filter_map(|OpenFrame { frame, grip, hold }| {
+    views(recording, sketches, &open_frames(recording, clip, trajectory))
+}
+
+/// Those of `frames` that have a sketch, as views.
+#[must_use]
+pub fn views<'a>(recording: &Recording, sketches: &'a BTreeMap<usize, Sketch>, frames: &[OpenFrame]) -> Vec<View<'a>> {
+    frames
+        .iter()
+        .filter_map(|&OpenFrame { frame, grip, hold }| {
             let world_from_camera = recording.frames[frame].world_from_camera;
             Some(View {
                 camera_from_world: world_from_camera.inverse(),

@@ -60,8 +60,8 @@ pub struct Noise {
 /// Error of a frame's depth of one surface, metres: one that all its points share, and what they have of their own. The
 /// latter bends over a few decimetres, so a leaf is worth few points.
 const SHARED_STD_M: f64 = 0.01;
-const OWN_STD_M: f64 = 0.015;
-const INDEPENDENT: f64 = 30.0;
+pub(super) const OWN_STD_M: f64 = 0.015;
+pub(super) const INDEPENDENT: f64 = 30.0;
 /// How well the plane of the front is known, and with it a hinge across it, metres.
 const PLANE_STD_M: f64 = 0.015;
 /// Degrees of freedom of the hand's error: few, as some hands are lost before a part is closed.
@@ -72,7 +72,7 @@ pub const LEAST_LEVER_M: f64 = 0.1;
 const STEPS: usize = 14;
 /// Beyond this a view looks past the leaf or at what hides it, metres: loose while the opening is unsure, then tight.
 const LOOSE_M: f64 = 0.08;
-const TIGHT_M: f64 = 0.03;
+pub(super) const TIGHT_M: f64 = 0.03;
 
 /// One view of one clip with the opening that the hand gives.
 struct Seen<'a> {
@@ -179,14 +179,28 @@ fn shifted(joint: &Articulation, e1: &Vector, e2: &Vector, shift: [f64; 2]) -> A
 }
 
 /// Points of a leaf, closed, world, with its outward normal.
-struct Leaf {
+pub(super) struct Leaf {
     points: Vec<Point>,
     normal: Vector,
     board_m: f64,
 }
 
+/// The surface that a view sees where a point of a leaf should be.
+pub(super) struct Behind {
+    /// How far it lies from the leaf's point, along the leaf's normal there, metres.
+    pub(super) along_normal: f64,
+    /// The leaf's point where the view sees it, world.
+    at: Point,
+    /// Out of the leaf's front there, world.
+    normal: Vector,
+    /// The point's way from its closed place, metres.
+    way: f64,
+    /// Depth of the point, metres.
+    depth: f64,
+}
+
 impl Leaf {
-    fn of(face: &Face, rect: &Rect, board_m: f64) -> Self {
+    pub(super) fn of(face: &Face, rect: &Rect, board_m: f64) -> Self {
         // The rim is where an outline is off by a cell.
         const RIM: f64 = 0.06;
         let at = |k: usize, b: [f64; 2]| {
@@ -198,34 +212,32 @@ impl Leaf {
             .collect();
         Self { points, normal: face.normal, board_m }
     }
+
+    pub(super) fn points(&self) -> &[Point] {
+        &self.points
+    }
+
+    /// What a view sees where `point` (closed, world) is at `opening`. `None` where nothing is seen or at a grazing slant.
+    pub(super) fn behind(&self, point: &Point, joint: &Articulation, opening: f64, view: &View) -> Option<Behind> {
+        let motion = joint.motion(opening);
+        let normal = motion.rotation * self.normal;
+        let front = motion * point;
+        let ray = unit(&(front - view.eye))?;
+        let slant = normal.dot(&ray);
+        if slant.abs() < GRAZING {
+            return None;
+        }
+        // Seen from behind, the surface is the leaf's back.
+        let at = if slant < 0.0 { front } else { front - normal * self.board_m };
+        let (gap, depth) = view.gap(&at)?;
+        let along_ray = gap * (at - view.eye).norm() / depth;
+        Some(Behind { along_normal: along_ray * slant, at, normal, way: (front - point).norm(), depth })
+    }
 }
 
-/// How far the surface that a view sees lies from the leaf's point, along the leaf's normal there; with the point and the
-/// normal in the world. `None` where nothing is seen, at a grazing slant, or where the point has not left its closed place.
-fn displacement(
-    leaf: &Leaf,
-    point: &Point,
-    joint: &Articulation,
-    opening: f64,
-    view: &View,
-) -> Option<(f64, Point, Vector)> {
-    let motion = joint.motion(opening);
-    let normal = motion.rotation * leaf.normal;
-    let front = motion * point;
-    let ray = unit(&(front - view.eye))?;
-    let slant = normal.dot(&ray);
-    if slant.abs() < GRAZING {
-        return None;
-    }
-    // Seen from behind, the surface is the leaf's back.
-    let at = if slant < 0.0 { front } else { front - normal * leaf.board_m };
-    let (gap, depth) = view.gap(&at)?;
-    // Near its closed place the leaf cannot be told from what is behind it.
-    if (front - point).norm() < 2.0 * super::moved::tolerance(depth) {
-        return None;
-    }
-    let along_ray = gap * (at - view.eye).norm() / depth;
-    Some((along_ray * slant, at, normal))
+/// As [`Leaf::behind`], but for points that have left their closed place: near it a leaf cannot be told from what is behind it.
+fn displacement(leaf: &Leaf, point: &Point, joint: &Articulation, opening: f64, view: &View) -> Option<Behind> {
+    leaf.behind(point, joint, opening, view).filter(|b| b.way >= 2.0 * super::moved::tolerance(b.depth))
 }
 
 fn weight(residual: f64, scale: f64) -> f64 {
@@ -249,10 +261,15 @@ fn coarse(sights: &Sights, joint: &Articulation, clip: &OpenState, views: &[Seen
         .map(|offset| {
             let x = offset / std;
             let seen = sights::log_likelihood(sights::seen_share(sights, joint, &clip.grip, &[hold], offset));
-            (seen - 0.5 * (TAIL + 1.0) * (x * x / TAIL).ln_1p(), offset)
+            (seen + hand_log(x), offset)
         })
         .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.abs().total_cmp(&a.1.abs())))
         .map_or(0.0, |(_, offset)| offset)
+}
+
+/// Log density of a hand's error of `x` standard deviations, but for a constant.
+pub(super) fn hand_log(x: f64) -> f64 {
+    -0.5 * (TAIL + 1.0) * (x * x / TAIL).ln_1p()
 }
 
 /// Standard deviations to each side in which an offset is looked for: a hand that was lost, or seen to let go by a flag that
@@ -311,7 +328,7 @@ fn normal_equations(
             .points
             .iter()
             .filter_map(|p| {
-                let (r, at, normal) = displacement(leaf, p, joint, opening, s.view)?;
+                let Behind { along_normal, at, normal, .. } = displacement(leaf, p, joint, opening, s.view)?;
                 // How the leaf moves along its normal with each parameter.
                 let by_opening = match joint.kind {
                     JointKind::Revolute => joint.axis.cross(&(at - joint.origin)),
@@ -321,7 +338,7 @@ fn normal_equations(
                     JointKind::Revolute => normal.dot(&(e - turn * e)),
                     JointKind::Prismatic => 0.0,
                 };
-                let r = r - bias;
+                let r = along_normal - bias;
                 Some(([by(e1), by(e2), normal.dot(&by_opening), 1.0], r, weight(r, scale)))
             })
             .collect();

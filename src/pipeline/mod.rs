@@ -97,7 +97,7 @@ pub struct SceneJoint {
     pub face: Option<Face>,
     /// The moving part of the face.
     pub part: Option<Rect>,
-    /// Largest opening that was observed, rad or m.
+    /// Largest opening that was observed, against the closed state, rad or m.
     pub observed_range: f64,
     /// Opening that each of `clips` went through, rad or m.
     pub moved: Vec<f64>,
@@ -122,6 +122,8 @@ pub struct Hypothesis {
     pub uncertainty: Option<Uncertainty>,
     /// As [`SceneJoint::part`].
     pub part: Option<Rect>,
+    /// As [`SceneJoint::observed_range`].
+    pub observed_range: f64,
     /// As [`SceneJoint::moved`].
     pub moved: Vec<f64>,
     /// What physics says against it, where it was asked.
@@ -137,7 +139,7 @@ impl SceneJoint {
             joint: hypothesis.joint,
             uncertainty: hypothesis.uncertainty.clone(),
             part: hypothesis.part,
-            observed_range: hypothesis.moved.iter().copied().fold(0.0, f64::max),
+            observed_range: hypothesis.observed_range,
             moved: hypothesis.moved.clone(),
             ..self.clone()
         }

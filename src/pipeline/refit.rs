@@ -5,15 +5,17 @@ use std::collections::BTreeMap;
 use super::ClipResult;
 use crate::articulation::{Action, Articulation, JointKind};
 use crate::config::Config;
+use crate::geometry::ajar;
 use crate::geometry::candidates::IN_FACE;
 use crate::geometry::moved::{self, Hold};
 use crate::geometry::openings::{self, OpenState, Opening};
 use crate::geometry::{Face, Rect, outline};
 use crate::hands::{self, Trajectory};
 use crate::inference::uncertainty::OpenStates;
+use crate::localization;
 use crate::math::{Point, stats};
-use crate::recording::Recording;
 use crate::recording::sketch::Sketch;
+use crate::recording::{Clip, Recording};
 
 /// A joint after its open views were looked at.
 pub(super) struct Refitted<'a> {
@@ -23,6 +25,8 @@ pub(super) struct Refitted<'a> {
     pub(super) openings: Vec<f64>,
     /// Opening that each clip went through, rad or m.
     pub(super) ranges: Vec<f64>,
+    /// Largest opening against the closed state, rad or m.
+    pub(super) widest: f64,
     /// How sure hinge and ranges are.
     pub(super) depth: OpenStates,
 }
@@ -76,17 +80,23 @@ pub(super) fn refitted<'a>(
         .map(|(((_, t), state), seen)| open_end(&fit.joint, t, state, seen))
         .collect();
     let ends = left_where_found(shown, &ends);
-    let ranges = ends.iter().map(|end| end.value.max(0.0)).collect();
+    let begins: Vec<Opening> = shown
+        .iter()
+        .zip(&ends)
+        .map(|((clip, t), end)| closed_end(recording, sketches, (&clip.clip, t), &fit.joint, closed, end, config))
+        .collect();
+    let ranges = ends.iter().zip(&begins).map(|(end, begin)| (end.value - begin.value).max(0.0)).collect();
     // The views share a hand, a depth estimate and an outline: covariances that take them for independent are too small.
     let shared = config.inference.shared_errors;
     let depth = OpenStates {
         across: fit.across,
         hinge_cov_m2: fit.hinge_cov_m2.map(|rows| rows.map(|row| row.map(|x| shared * x))),
-        moved_std: ends.iter().map(|end| shared.sqrt() * end.std).collect(),
+        moved_std: ends.iter().zip(&begins).map(|(end, begin)| shared.sqrt() * end.std.hypot(begin.std)).collect(),
     };
     let openings = fit.openings.iter().flatten().map(|o| o.value).collect();
     let views = views.into_iter().flatten().collect();
-    Some(Refitted { joint: fit.joint, views, openings, ranges, depth })
+    let widest = ends.iter().map(|end| end.value).fold(0.0, f64::max);
+    Some(Refitted { joint: fit.joint, views, openings, ranges, widest, depth })
 }
 
 /// Along which of its front's axes (0 = right, 1 = up) a slide stays within the front; `None` for all other joints.
@@ -124,6 +134,48 @@ fn open_end(joint: &Articulation, trajectory: &Trajectory, state: &OpenState, se
     Opening { value, std, informed: after.or(during).is_some() }
 }
 
+/// Opening at the closed end of a clip: zero unless the part is seen to stand ajar.
+fn closed_end(
+    recording: &Recording,
+    sketches: &BTreeMap<usize, Sketch>,
+    (clip, trajectory): (&Clip, &Trajectory),
+    joint: &Articulation,
+    closed: &Closed,
+    end: &Opening,
+    config: &Config,
+) -> Opening {
+    let shut = Opening { value: 0.0, std: 0.0, informed: false };
+    // Along its front a leaf shows no depth of its own. A hand alone tells the way, not the ends.
+    if !end.informed || within_front(joint, &closed.face).is_some() {
+        return shut;
+    }
+    let grip = trajectory.closed_grip();
+    let [first, last] = trajectory.contact_frames();
+    // Of all views of the closed part those between which and the hand nothing else was moved.
+    let frames: Vec<moved::OpenFrame> = localization::local_frames(recording, clip, trajectory, &config.localization)
+        .into_iter()
+        .filter(|&frame| match trajectory.action {
+            Action::Open => {
+                frame <= last
+                    && !recording
+                        .clips
+                        .iter()
+                        .any(|c| (frame..first).contains(&c.end_frame) && c.end_frame > c.start_frame)
+            }
+            Action::Close => frame >= first,
+        })
+        .map(|frame| moved::OpenFrame { frame, grip, hold: Hold::Sure })
+        .collect();
+    let lever = joint.lever(&grip).max(openings::LEAST_LEVER_M);
+    let known = ajar::Known {
+        end: end.value,
+        went: joint.opening_at(&grip, &trajectory.open_grip()),
+        went_std: trajectory.ends_seen.map(hands::grip_std_m).into_iter().fold(0.0, f64::hypot) / lever,
+    };
+    let views = moved::views(recording, sketches, &frames);
+    ajar::ajar(&closed.face, &closed.rect, joint, &views, &known, config.fitting.board_m)
+}
+
 /// A part stays where it was left: the open end of a clip is where the next clip of the part finds it. Both clips' values
 /// become their weighted mean, which is surer than either: each clip has a hand's and a depth's error of its own. Where they
 /// are at odds, one of the hands was followed on a part of its way only, and the farther one saw more of it.
@@ -159,7 +211,6 @@ fn left_where_found(shown: &[(&ClipResult, &Trajectory)], ends: &[Opening]) -> V
 mod tests {
     use super::*;
     use crate::hands::Sample;
-    use crate::recording::Clip;
 
     fn clip(start_frame: usize) -> ClipResult {
         let [clip, narration, verb, noun] = [(); 4].map(|()| String::new());

@@ -226,7 +226,7 @@ fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
         grip: judged.grip,
         face: clips[judged.best].face,
         part: answer.part,
-        observed_range: answer.moved.iter().copied().fold(0.0, f64::max),
+        observed_range: answer.observed_range,
         moved: answer.moved,
         hypotheses,
     })
@@ -364,6 +364,7 @@ fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around) -> Hy
     let mut part = clips[best].part;
     let mut moved: Vec<f64> =
         shown.iter().map(|(_, t)| inference::observed_range(&joint, &t.closed_grip(), &t.positions())).collect();
+    let mut widest = moved.iter().copied().fold(0.0, f64::max);
     // A part of which no outline was seen to move: the piece of it around the grip.
     let rect = part.unwrap_or(outline::SMALLEST);
     if config.inference.refit
@@ -379,6 +380,7 @@ fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around) -> Hy
     {
         joint = fit.joint;
         moved = fit.ranges;
+        widest = fit.widest;
         depth = Some(fit.depth);
         // With the openings known better the part's outline is, too.
         let seen = Some((&joint, fit.openings.as_slice()));
@@ -396,5 +398,14 @@ fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around) -> Hy
         depth: depth.as_ref(),
     };
     let uncertainty = uncertainty::of(&evidence, &config.reasoning);
-    Hypothesis { joint, share: likely.share, type_share: likely.type_share, uncertainty, part, moved, refuted: None }
+    Hypothesis {
+        joint,
+        share: likely.share,
+        type_share: likely.type_share,
+        uncertainty,
+        part,
+        observed_range: widest,
+        moved,
+        refuted: None,
+    }
 }

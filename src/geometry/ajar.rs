@@ -1,0 +1,143 @@
+//! How far a part stands open where a clip begins to open it or ends closing it: people leave doors ajar (ours).
+
+use super::Face;
+use super::face::Rect;
+use super::moved::View;
+use super::openings::{self, Leaf, Opening};
+use crate::articulation::Articulation;
+
+/// Share of all closings that shut the part, and of openings that begin with it shut. Assumed.
+const SHUT: f64 = 0.8;
+/// Of the leaf's place against the front it was fitted to, shared by all points of a view, metres: of the plane and of the
+/// view's depth.
+const SHARED_STD_M: f64 = 0.018;
+
+/// What is known of a clip before its closed end is looked at.
+#[derive(Debug, Clone, Copy)]
+pub struct Known {
+    /// Opening at the clip's open end, rad or m.
+    pub end: f64,
+    /// Opening that the hand went through, rad or m.
+    pub went: f64,
+    /// Standard deviation of `went`.
+    pub went_std: f64,
+}
+
+/// The opening at the closed end of a clip, from the depth of `views` there and from how far the hand went. Zero where being
+/// shut is at least as likely, or where no view tells.
+#[must_use]
+pub fn ajar(face: &Face, rect: &Rect, joint: &Articulation, views: &[View], known: &Known, board_m: f64) -> Opening {
+    /// Of the outermost point of the leaf.
+    const STEP_M: f64 = 0.01;
+    const MOST_STEPS: usize = 100;
+    let leaf = Leaf::of(face, rect, board_m);
+    let shut = Opening { value: 0.0, std: 0.0, informed: false };
+    let reach = leaf.points().iter().map(|p| joint.lever(p)).fold(0.0, f64::max);
+    let step = (STEP_M / reach.max(openings::LEAST_LEVER_M)).max(known.end / MOST_STEPS as f64);
+    let at: Vec<f64> = (1..).map(|k| f64::from(k) * step).take_while(|x| *x < known.end).collect();
+    let before: Vec<View> = views.iter().filter(|view| shows(&leaf, joint, view)).copied().collect();
+    if at.is_empty() || before.is_empty() {
+        return shut;
+    }
+    let by_hand = |x: f64| openings::hand_log((known.end - x - known.went) / known.went_std);
+    let weights: Vec<f64> = at
+        .iter()
+        .map(|&x| {
+            // A part that stands ajar does so in every view; in one that is still on its way the nearest ones are open only.
+            let seen = before.iter().map(|view| odds(&leaf, joint, x, view)).fold(f64::INFINITY, f64::min);
+            // A hand alone does not tell: it may have been lost on its way.
+            if seen <= 0.0 {
+                return 0.0;
+            }
+            (seen + by_hand(x) - by_hand(0.0)).exp() * (1.0 - SHUT) / at.len() as f64
+        })
+        .collect();
+    let total: f64 = weights.iter().sum();
+    if !total.is_finite() || total <= SHUT {
+        return shut;
+    }
+    let mean = at.iter().zip(&weights).map(|(x, w)| x * w / total).sum::<f64>();
+    let variance = at.iter().zip(&weights).map(|(x, w)| (x - mean).powi(2) * w / total).sum::<f64>();
+    Opening { value: mean, std: variance.sqrt(), informed: true }
+}
+
+/// Points of the leaf that have to be seen, of all.
+const LEAST_SEEN: f64 = 0.3;
+
+fn shows(leaf: &Leaf, joint: &Articulation, view: &View) -> bool {
+    let seen = leaf.points().iter().filter(|p| leaf.behind(p, joint, 0.0, view).is_some()).count();
+    seen as f64 >= LEAST_SEEN * leaf.points().len() as f64
+}
+
+/// Log odds of a leaf that stands at `x` against one that is shut, from one view's depth.
+fn odds(leaf: &Leaf, joint: &Articulation, x: f64, view: &View) -> f64 {
+    let both: Vec<[f64; 2]> = leaf
+        .points()
+        .iter()
+        .filter_map(|p| {
+            let behind = |opening: f64| leaf.behind(p, joint, opening, view).map(|seen| seen.along_normal);
+            Some([behind(x)?, behind(0.0)?])
+        })
+        .collect();
+    if (both.len() as f64) < LEAST_SEEN * leaf.points().len() as f64 {
+        return 0.0;
+    }
+    let worth = (openings::INDEPENDENT / both.len() as f64).min(1.0);
+    let [open, shut] = [0, 1].map(|k| explained(both.iter().map(move |r| r[k]), worth));
+    open - shut
+}
+
+/// How well a leaf's place explains the depth: robust, under the best error that all points share.
+fn explained(residuals: impl Iterator<Item = f64> + Clone, worth: f64) -> f64 {
+    const STEPS: i32 = 4;
+    (-STEPS..=STEPS)
+        .map(|k| f64::from(k) / f64::from(STEPS) * 2.0 * SHARED_STD_M)
+        .map(|bias| {
+            let misfit: f64 = residuals.clone().map(|r| cost(r - bias)).sum();
+            -worth * misfit - 0.5 * (bias / SHARED_STD_M).powi(2)
+        })
+        .fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Of one point, bounded: what hides the leaf or lies behind its edge says no more against one place than against another.
+fn cost(residual: f64) -> f64 {
+    let [x, bound] = [residual, openings::TIGHT_M].map(|r| (r / openings::OWN_STD_M).powi(2));
+    0.5 * x * bound / (x + bound)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::moved::drawn;
+    use super::*;
+    use crate::articulation::JointKind;
+    use crate::math::{Point, Vector};
+
+    fn door() -> Articulation {
+        Articulation { kind: JointKind::Revolute, axis: -Vector::z(), origin: Point::new(-0.25, 0.0, 0.0) }
+    }
+
+    /// What is said of a door that stands at `openings` in as many views, after a hand that went `went` of 1.2 rad.
+    fn found(openings: &[f64], went: f64) -> Opening {
+        let pose = drawn::pose(Point::new(0.5, -1.0, 0.4));
+        let sketches: Vec<_> = openings.iter().map(|x| drawn::sketch(&pose, &door(), *x)).collect();
+        let grip = drawn::face().center;
+        let views: Vec<View> = sketches.iter().map(|s| drawn::view(s, &pose, grip)).collect();
+        let known = Known { end: 1.2, went, went_std: 0.1 };
+        ajar(&drawn::face(), &drawn::rect(), &door(), &views, &known, 0.018)
+    }
+
+    #[test]
+    fn a_door_left_ajar_is_seen_to_be() {
+        let left = found(&[0.3, 0.3], 0.95);
+        assert!(left.informed && (left.value - 0.3).abs() < 0.03 && left.std < 0.03, "{left:?}");
+        // Whatever the hand says.
+        assert!((found(&[0.3], 1.2).value - 0.3).abs() < 0.03);
+    }
+
+    #[test]
+    fn a_door_that_was_shut_stays_shut() {
+        for shut in [found(&[0.0, 0.0], 1.2), found(&[0.0], 0.8), found(&[], 0.8), found(&[0.4, 0.2, 0.0], 1.2)] {
+            assert_eq!(shut, Opening { value: 0.0, std: 0.0, informed: false });
+        }
+    }
+}
