@@ -2,16 +2,13 @@
 
 use super::Face;
 use super::face::Rect;
+use super::leaf::{self, Leaf};
 use super::moved::View;
-use super::openings::{self, Leaf, Opening};
+use super::openings::{self, Opening};
 use crate::articulation::Articulation;
 
 /// Share of all closings that shut the part, and of openings that begin with it shut. Assumed.
 const SHUT: f64 = 0.8;
-/// Of the leaf's place against the front it was fitted to, shared by all points of a view, metres: of the plane and of the
-/// view's depth.
-const SHARED_STD_M: f64 = 0.018;
-
 /// What is known of a clip before its closed end is looked at.
 #[derive(Debug, Clone, Copy)]
 pub struct Known {
@@ -35,7 +32,7 @@ pub fn ajar(face: &Face, rect: &Rect, joint: &Articulation, views: &[View], know
     let reach = leaf.points().iter().map(|p| joint.lever(p)).fold(0.0, f64::max);
     let step = (STEP_M / reach.max(openings::LEAST_LEVER_M)).max(known.end / MOST_STEPS as f64);
     let at: Vec<f64> = (1..).map(|k| f64::from(k) * step).take_while(|x| *x < known.end).collect();
-    let before: Vec<View> = views.iter().filter(|view| shows(&leaf, joint, view)).copied().collect();
+    let before: Vec<View> = views.iter().filter(|view| leaf::shows(&leaf, joint, view)).copied().collect();
     if at.is_empty() || before.is_empty() {
         return shut;
     }
@@ -44,7 +41,7 @@ pub fn ajar(face: &Face, rect: &Rect, joint: &Articulation, views: &[View], know
         .iter()
         .map(|&x| {
             // A part that stands ajar does so in every view; in one that is still on its way the nearest ones are open only.
-            let seen = before.iter().map(|view| odds(&leaf, joint, x, view)).fold(f64::INFINITY, f64::min);
+            let seen = before.iter().map(|view| leaf::odds(&leaf, joint, x, view)).fold(f64::INFINITY, f64::min);
             // A hand alone does not tell: it may have been lost on its way.
             if seen <= 0.0 {
                 return 0.0;
@@ -59,50 +56,6 @@ pub fn ajar(face: &Face, rect: &Rect, joint: &Articulation, views: &[View], know
     let mean = at.iter().zip(&weights).map(|(x, w)| x * w / total).sum::<f64>();
     let variance = at.iter().zip(&weights).map(|(x, w)| (x - mean).powi(2) * w / total).sum::<f64>();
     Opening { value: mean, std: variance.sqrt(), informed: true }
-}
-
-/// Points of the leaf that have to be seen, of all.
-const LEAST_SEEN: f64 = 0.3;
-
-fn shows(leaf: &Leaf, joint: &Articulation, view: &View) -> bool {
-    let seen = leaf.points().iter().filter(|p| leaf.behind(p, joint, 0.0, view).is_some()).count();
-    seen as f64 >= LEAST_SEEN * leaf.points().len() as f64
-}
-
-/// Log odds of a leaf that stands at `x` against one that is shut, from one view's depth.
-fn odds(leaf: &Leaf, joint: &Articulation, x: f64, view: &View) -> f64 {
-    let both: Vec<[f64; 2]> = leaf
-        .points()
-        .iter()
-        .filter_map(|p| {
-            let behind = |opening: f64| leaf.behind(p, joint, opening, view).map(|seen| seen.along_normal);
-            Some([behind(x)?, behind(0.0)?])
-        })
-        .collect();
-    if (both.len() as f64) < LEAST_SEEN * leaf.points().len() as f64 {
-        return 0.0;
-    }
-    let worth = (openings::INDEPENDENT / both.len() as f64).min(1.0);
-    let [open, shut] = [0, 1].map(|k| explained(both.iter().map(move |r| r[k]), worth));
-    open - shut
-}
-
-/// How well a leaf's place explains the depth: robust, under the best error that all points share.
-fn explained(residuals: impl Iterator<Item = f64> + Clone, worth: f64) -> f64 {
-    const STEPS: i32 = 4;
-    (-STEPS..=STEPS)
-        .map(|k| f64::from(k) / f64::from(STEPS) * 2.0 * SHARED_STD_M)
-        .map(|bias| {
-            let misfit: f64 = residuals.clone().map(|r| cost(r - bias)).sum();
-            -worth * misfit - 0.5 * (bias / SHARED_STD_M).powi(2)
-        })
-        .fold(f64::NEG_INFINITY, f64::max)
-}
-
-/// Of one point, bounded: what hides the leaf or lies behind its edge says no more against one place than against another.
-fn cost(residual: f64) -> f64 {
-    let [x, bound] = [residual, openings::TIGHT_M].map(|r| (r / openings::OWN_STD_M).powi(2));
-    0.5 * x * bound / (x + bound)
 }
 
 #[cfg(test)]

@@ -7,11 +7,13 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::Face;
+use super::candidates::IN_FACE;
 use super::face::Rect;
-use super::moved::{GRAZING, Hold, View};
+use super::leaf::{self, Behind, INDEPENDENT, Leaf, OWN_STD_M, TIGHT_M};
+use super::moved::{Hold, View};
 use super::sights::{self, Sights};
 use crate::articulation::{Articulation, JointKind};
-use crate::math::{Point, Vector, any_orthogonal, reject, unit};
+use crate::math::{Point, Vector, any_orthogonal, reject, stats, unit};
 
 /// The views of one clip's open state, with the grip when closed as that clip's hand has it.
 #[derive(Debug, Clone, Copy)]
@@ -57,22 +59,16 @@ pub struct Noise {
     pub board_m: f64,
 }
 
-/// Error of a frame's depth of one surface, metres: one that all its points share, and what they have of their own. The
-/// latter bends over a few decimetres, so a leaf is worth few points.
+/// Error of a frame's depth of one surface that all its points share, metres.
 const SHARED_STD_M: f64 = 0.01;
-pub(super) const OWN_STD_M: f64 = 0.015;
-pub(super) const INDEPENDENT: f64 = 30.0;
 /// How well the plane of the front is known, and with it a hinge across it, metres.
 const PLANE_STD_M: f64 = 0.015;
 /// Degrees of freedom of the hand's error: few, as some hands are lost before a part is closed.
 const TAIL: f64 = 2.0;
 /// Hands hold doors no nearer to their hinge than this, metres.
 pub const LEAST_LEVER_M: f64 = 0.1;
-/// Points of the leaf that are compared, each way.
-const STEPS: usize = 14;
-/// Beyond this a view looks past the leaf or at what hides it, metres: loose while the opening is unsure, then tight.
+/// As [`TIGHT_M`], while the opening is unsure.
 const LOOSE_M: f64 = 0.08;
-pub(super) const TIGHT_M: f64 = 0.03;
 
 /// One view of one clip with the opening that the hand gives.
 struct Seen<'a> {
@@ -106,7 +102,10 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
         .zip(clips)
         .map(|(views, clip)| {
             let sights = Sights::of(face, Some(rect), clip.views);
-            let of = Hold::ALL.map(|hold| coarse(&sights, joint, clip, views, hold, lever(clip)));
+            let of = Hold::ALL.map(|hold| {
+                let offset = coarse(&sights, joint, clip, views, hold, lever(clip));
+                if hold == Hold::Sure { offset } else { standing(&leaf, joint, views, hold, offset) }
+            });
             views.iter().map(|s| of[s.view.hold as usize]).collect()
         })
         .collect();
@@ -178,63 +177,6 @@ fn shifted(joint: &Articulation, e1: &Vector, e2: &Vector, shift: [f64; 2]) -> A
     Articulation { origin: joint.origin + e1 * shift[0] + e2 * shift[1], ..*joint }
 }
 
-/// Points of a leaf, closed, world, with its outward normal.
-pub(super) struct Leaf {
-    points: Vec<Point>,
-    normal: Vector,
-    board_m: f64,
-}
-
-/// The surface that a view sees where a point of a leaf should be.
-pub(super) struct Behind {
-    /// How far it lies from the leaf's point, along the leaf's normal there, metres.
-    pub(super) along_normal: f64,
-    /// The leaf's point where the view sees it, world.
-    at: Point,
-    /// Out of the leaf's front there, world.
-    normal: Vector,
-    /// The point's way from its closed place, metres.
-    way: f64,
-    /// Depth of the point, metres.
-    depth: f64,
-}
-
-impl Leaf {
-    pub(super) fn of(face: &Face, rect: &Rect, board_m: f64) -> Self {
-        // The rim is where an outline is off by a cell.
-        const RIM: f64 = 0.06;
-        let at = |k: usize, b: [f64; 2]| {
-            let share = RIM + (1.0 - 2.0 * RIM) * (k as f64 + 0.5) / STEPS as f64;
-            b[0] + (b[1] - b[0]) * share
-        };
-        let points = (0..STEPS * STEPS)
-            .map(|i| face.point(at(i % STEPS, rect.bounds[0]), at(i / STEPS, rect.bounds[1]), 0.0))
-            .collect();
-        Self { points, normal: face.normal, board_m }
-    }
-
-    pub(super) fn points(&self) -> &[Point] {
-        &self.points
-    }
-
-    /// What a view sees where `point` (closed, world) is at `opening`. `None` where nothing is seen or at a grazing slant.
-    pub(super) fn behind(&self, point: &Point, joint: &Articulation, opening: f64, view: &View) -> Option<Behind> {
-        let motion = joint.motion(opening);
-        let normal = motion.rotation * self.normal;
-        let front = motion * point;
-        let ray = unit(&(front - view.eye))?;
-        let slant = normal.dot(&ray);
-        if slant.abs() < GRAZING {
-            return None;
-        }
-        // Seen from behind, the surface is the leaf's back.
-        let at = if slant < 0.0 { front } else { front - normal * self.board_m };
-        let (gap, depth) = view.gap(&at)?;
-        let along_ray = gap * (at - view.eye).norm() / depth;
-        Some(Behind { along_normal: along_ray * slant, at, normal, way: (front - point).norm(), depth })
-    }
-}
-
 /// As [`Leaf::behind`], but for points that have left their closed place: near it a leaf cannot be told from what is behind it.
 fn displacement(leaf: &Leaf, point: &Point, joint: &Articulation, opening: f64, view: &View) -> Option<Behind> {
     leaf.behind(point, joint, opening, view).filter(|b| b.way >= 2.0 * super::moved::tolerance(b.depth))
@@ -270,6 +212,46 @@ fn coarse(sights: &Sights, joint: &Articulation, clip: &OpenState, views: &[Seen
 /// Log density of a hand's error of `x` standard deviations, but for a constant.
 pub(super) fn hand_log(x: f64) -> f64 {
     -0.5 * (TAIL + 1.0) * (x * x / TAIL).ln_1p()
+}
+
+/// The same for views in which the part stands: the offset given, unless the leaf at another opening explains their depth
+/// better by far. A leaf that was left near its closed place, or far from where the hand was lost, is found so only.
+fn standing(leaf: &Leaf, joint: &Articulation, views: &[Seen], hold: Hold, offset: f64) -> f64 {
+    /// Nats; the errors of depth and outline that views share are worth a few.
+    const BY_FAR: f64 = 6.0;
+    const STEP_M: f64 = 0.01;
+    /// No part opens further, rad and m.
+    const WIDEST: [f64; 2] = [2.5, 0.8];
+    let of_sort: Vec<&Seen> = views.iter().filter(|s| s.view.hold == hold).collect();
+    let Some(first) = of_sort.first() else { return offset };
+    let slides_in_front = joint.kind == JointKind::Prismatic && joint.axis.dot(&leaf.normal()).abs() < IN_FACE;
+    // Along its front a leaf shows no depth of its own.
+    if slides_in_front {
+        return offset;
+    }
+    let reach = leaf.points().iter().map(|p| joint.lever(p)).fold(LEAST_LEVER_M, f64::max);
+    let (step, widest) = match joint.kind {
+        JointKind::Revolute => (STEP_M / reach, WIDEST[0]),
+        JointKind::Prismatic => (STEP_M, WIDEST[1]),
+    };
+    let odds = |x: f64| {
+        let seen: Vec<f64> = of_sort.iter().map(|s| leaf::odds(leaf, joint, x, s.view)).collect();
+        stats::median(&seen).unwrap_or(0.0)
+    };
+    let weighed = |x: f64, seen: f64| seen + hand_log((x - first.hand) / first.std);
+    let given = first.hand + offset;
+    let best = (1..)
+        .map(|k| f64::from(k) * step)
+        .take_while(|x| *x <= widest)
+        .map(|x| (x, odds(x)))
+        // What was opened is not shut.
+        .filter(|(_, seen)| *seen > BY_FAR)
+        .map(|(x, seen)| (x, weighed(x, seen)))
+        .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.total_cmp(&a.0)));
+    match best {
+        Some((x, nats)) if nats > weighed(given, odds(given)) + BY_FAR => x - first.hand,
+        _ => offset,
+    }
 }
 
 /// Standard deviations to each side in which an offset is looked for: a hand that was lost, or seen to let go by a flag that
@@ -325,7 +307,7 @@ fn normal_equations(
         let opening = s.hand + offset;
         let turn = joint.motion(opening).rotation;
         let rows: Vec<([f64; 4], f64, f64)> = leaf
-            .points
+            .points()
             .iter()
             .filter_map(|p| {
                 let Behind { along_normal, at, normal, .. } = displacement(leaf, p, joint, opening, s.view)?;
