@@ -37,16 +37,20 @@ pub fn ajar(face: &Face, rect: &Rect, joint: &Articulation, views: &[View], know
         return shut;
     }
     let by_hand = |x: f64| openings::hand_log((known.end - x - known.went) / known.went_std);
+    let seen: Vec<Vec<f64>> =
+        before.iter().map(|view| at.iter().map(|&x| leaf::odds(&leaf, joint, x, view, |_| true)).collect()).collect();
+    let best: Vec<f64> = seen.iter().map(|odds| odds.iter().copied().fold(0.0, f64::max)).collect();
     let weights: Vec<f64> = at
         .iter()
-        .map(|&x| {
-            // A part that stands ajar does so in every view; in one that is still on its way the nearest ones are open only.
-            let seen = before.iter().map(|view| leaf::odds(&leaf, joint, x, view)).fold(f64::INFINITY, f64::min);
-            // A hand alone does not tell: it may have been lost on its way.
-            if seen <= 0.0 {
+        .enumerate()
+        .map(|(k, &x)| {
+            // A part that stands ajar does so in every view; one that is still on its way is elsewhere in each.
+            if seen.iter().zip(&best).any(|(odds, best)| odds[k] <= 0.0 || odds[k] < best - openings::BY_FAR) {
                 return 0.0;
             }
-            (seen + by_hand(x) - by_hand(0.0)).exp() * (1.0 - SHUT) / at.len() as f64
+            // A hand alone does not tell, as it may have been lost on its way: views first.
+            let least = seen.iter().map(|odds| odds[k]).fold(f64::INFINITY, f64::min);
+            (least + by_hand(x) - by_hand(0.0)).exp() * (1.0 - SHUT) / at.len() as f64
         })
         .collect();
     let total: f64 = weights.iter().sum();

@@ -91,11 +91,12 @@ pub(super) fn shows(leaf: &Leaf, joint: &Articulation, view: &View) -> bool {
 }
 
 /// Log odds of a leaf that stands at `x` (rad or m) against one that is shut, from one view's depth; zero where it shows too
-/// little of either place.
-pub(super) fn odds(leaf: &Leaf, joint: &Articulation, x: f64, view: &View) -> f64 {
+/// little of either place. Of the leaf those points count that `counts` has.
+pub(super) fn odds(leaf: &Leaf, joint: &Articulation, x: f64, view: &View, counts: impl Fn(&Point) -> bool) -> f64 {
     let both: Vec<[f64; 2]> = leaf
         .points()
         .iter()
+        .filter(|p| counts(p))
         .filter_map(|p| {
             let behind = |opening: f64| leaf.behind(p, joint, opening, view).map(|seen| seen.along_normal);
             Some([behind(x)?, behind(0.0)?])

@@ -24,6 +24,8 @@ pub struct OpenState<'a> {
     pub grip_std_m: f64,
     /// See [`super::moved::open_views`].
     pub views: &'a [View<'a>],
+    /// Views of the closed state.
+    pub closed: &'a [View<'a>],
 }
 
 /// An opening and how well the views tell it, both rad or m.
@@ -63,6 +65,8 @@ pub struct Noise {
 const SHARED_STD_M: f64 = 0.01;
 /// How well the plane of the front is known, and with it a hinge across it, metres.
 const PLANE_STD_M: f64 = 0.015;
+/// Log odds, nats, beyond the errors of depth and outline that views share: those are worth a few.
+pub(super) const BY_FAR: f64 = 6.0;
 /// Degrees of freedom of the hand's error: few, as some hands are lost before a part is closed.
 const TAIL: f64 = 2.0;
 /// Hands hold doors no nearer to their hinge than this, metres.
@@ -104,7 +108,7 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
             let sights = Sights::of(face, Some(rect), clip.views);
             let of = Hold::ALL.map(|hold| {
                 let offset = coarse(&sights, joint, clip, views, hold, lever(clip));
-                if hold == Hold::Sure { offset } else { standing(&leaf, joint, views, hold, offset) }
+                if hold == Hold::Sure { offset } else { standing(&leaf, joint, clip, views, hold, offset) }
             });
             views.iter().map(|s| of[s.view.hold as usize]).collect()
         })
@@ -216,9 +220,7 @@ pub(super) fn hand_log(x: f64) -> f64 {
 
 /// The same for views in which the part stands: the offset given, unless the leaf at another opening explains their depth
 /// better by far. A leaf that was left near its closed place, or far from where the hand was lost, is found so only.
-fn standing(leaf: &Leaf, joint: &Articulation, views: &[Seen], hold: Hold, offset: f64) -> f64 {
-    /// Nats; the errors of depth and outline that views share are worth a few.
-    const BY_FAR: f64 = 6.0;
+fn standing(leaf: &Leaf, joint: &Articulation, clip: &OpenState, views: &[Seen], hold: Hold, offset: f64) -> f64 {
     const STEP_M: f64 = 0.01;
     /// No part opens further, rad and m.
     const WIDEST: [f64; 2] = [2.5, 0.8];
@@ -235,7 +237,13 @@ fn standing(leaf: &Leaf, joint: &Articulation, views: &[Seen], hold: Hold, offse
         JointKind::Prismatic => (STEP_M, WIDEST[1]),
     };
     let odds = |x: f64| {
-        let seen: Vec<f64> = of_sort.iter().map(|s| leaf::odds(leaf, joint, x, s.view)).collect();
+        // What was there while the part was closed, a wall behind a lid, is not the part.
+        let motion = joint.motion(x);
+        let was_free = |p: &Point| {
+            let at = motion * p;
+            !clip.closed.iter().any(|view| view.gap(&at).is_some_and(|(gap, _)| gap.abs() < TIGHT_M))
+        };
+        let seen: Vec<f64> = of_sort.iter().map(|s| leaf::odds(leaf, joint, x, s.view, was_free)).collect();
         stats::median(&seen).unwrap_or(0.0)
     };
     let weighed = |x: f64, seen: f64| seen + hand_log((x - first.hand) / first.std);
@@ -362,7 +370,7 @@ mod tests {
         let sketch = drawn::sketch(&pose, joint, opening);
         let grip = drawn::face().center;
         let views = [drawn::view(&sketch, &pose, believed.motion(told) * grip)];
-        let clips = [OpenState { grip, grip_std_m: 0.03, views: &views }];
+        let clips = [OpenState { grip, grip_std_m: 0.03, views: &views, closed: &[] }];
         refit(&drawn::face(), &drawn::rect(), believed, &clips, &NOISE)
     }
 

@@ -54,13 +54,16 @@ pub(super) fn refitted<'a>(
     let noise = openings::Noise { hinge_m: config.reasoning.hand_std_m, board_m: config.fitting.board_m };
     let views: Vec<Vec<moved::View>> =
         shown.iter().map(|(clip, t)| moved::open_views(recording, sketches, &clip.clip, t)).collect();
+    let still: Vec<Vec<moved::View>> =
+        shown.iter().map(|(clip, t)| closed_views(recording, sketches, &clip.clip, t, config)).collect();
     let states: Vec<OpenState> = shown
         .iter()
-        .zip(&views)
-        .map(|((_, t), views)| OpenState {
+        .zip(views.iter().zip(&still))
+        .map(|((_, t), (views, closed))| OpenState {
             grip: t.closed_grip(),
             grip_std_m: hands::grip_std_m(t.closed_end_seen()),
             views,
+            closed,
         })
         .collect();
     let mut fit = openings::refit(face, rect, joint, &states, &noise)?;
@@ -82,8 +85,8 @@ pub(super) fn refitted<'a>(
     let ends = left_where_found(shown, &ends);
     let begins: Vec<Opening> = shown
         .iter()
-        .zip(&ends)
-        .map(|((clip, t), end)| closed_end(recording, sketches, (&clip.clip, t), &fit.joint, closed, end, config))
+        .zip(states.iter().zip(&ends))
+        .map(|((_, t), (state, end))| closed_end(t, &fit.joint, closed, state, end, config))
         .collect();
     let ranges = ends.iter().zip(&begins).map(|(end, begin)| (end.value - begin.value).max(0.0)).collect();
     // The views share a hand, a depth estimate and an outline: covariances that take them for independent are too small.
@@ -134,46 +137,48 @@ fn open_end(joint: &Articulation, trajectory: &Trajectory, state: &OpenState, se
     Opening { value, std, informed: after.or(during).is_some() }
 }
 
-/// Opening at the closed end of a clip: zero unless the part is seen to stand ajar.
-fn closed_end(
+/// The views of the closed state between which and the hand nothing else was moved.
+fn closed_views<'a>(
     recording: &Recording,
-    sketches: &BTreeMap<usize, Sketch>,
-    (clip, trajectory): (&Clip, &Trajectory),
-    joint: &Articulation,
-    closed: &Closed,
-    end: &Opening,
+    sketches: &'a BTreeMap<usize, Sketch>,
+    clip: &Clip,
+    trajectory: &Trajectory,
     config: &Config,
-) -> Opening {
-    let shut = Opening { value: 0.0, std: 0.0, informed: false };
-    // Along its front a leaf shows no depth of its own. A hand alone tells the way, not the ends.
-    if !end.informed || within_front(joint, &closed.face).is_some() {
-        return shut;
-    }
+) -> Vec<moved::View<'a>> {
     let grip = trajectory.closed_grip();
     let [first, last] = trajectory.contact_frames();
-    // Of all views of the closed part those between which and the hand nothing else was moved.
+    let moves = |c: &Clip, frame: usize| c.end_frame > c.start_frame && (frame..first).contains(&c.end_frame);
     let frames: Vec<moved::OpenFrame> = localization::local_frames(recording, clip, trajectory, &config.localization)
         .into_iter()
         .filter(|&frame| match trajectory.action {
-            Action::Open => {
-                frame <= last
-                    && !recording
-                        .clips
-                        .iter()
-                        .any(|c| (frame..first).contains(&c.end_frame) && c.end_frame > c.start_frame)
-            }
+            Action::Open => frame <= last && !recording.clips.iter().any(|c| moves(c, frame)),
             Action::Close => frame >= first,
         })
         .map(|frame| moved::OpenFrame { frame, grip, hold: Hold::Sure })
         .collect();
-    let lever = joint.lever(&grip).max(openings::LEAST_LEVER_M);
+    moved::views(recording, sketches, &frames)
+}
+
+/// Opening at the closed end of a clip: zero unless the part is seen to stand ajar.
+fn closed_end(
+    trajectory: &Trajectory,
+    joint: &Articulation,
+    closed: &Closed,
+    state: &OpenState,
+    end: &Opening,
+    config: &Config,
+) -> Opening {
+    // Along its front a leaf shows no depth of its own. A hand alone tells the way, not the ends.
+    if !end.informed || within_front(joint, &closed.face).is_some() {
+        return Opening { value: 0.0, std: 0.0, informed: false };
+    }
+    let lever = joint.lever(&state.grip).max(openings::LEAST_LEVER_M);
     let known = ajar::Known {
         end: end.value,
-        went: joint.opening_at(&grip, &trajectory.open_grip()),
+        went: joint.opening_at(&state.grip, &trajectory.open_grip()),
         went_std: trajectory.ends_seen.map(hands::grip_std_m).into_iter().fold(0.0, f64::hypot) / lever,
     };
-    let views = moved::views(recording, sketches, &frames);
-    ajar::ajar(&closed.face, &closed.rect, joint, &views, &known, config.fitting.board_m)
+    ajar::ajar(&closed.face, &closed.rect, joint, state.closed, &known, config.fitting.board_m)
 }
 
 /// A part stays where it was left: the open end of a clip is where the next clip of the part finds it. Both clips' values
