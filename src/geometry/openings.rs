@@ -237,11 +237,12 @@ fn standing(leaf: &Leaf, joint: &Articulation, clip: &OpenState, views: &[Seen],
         JointKind::Prismatic => (STEP_M, WIDEST[1]),
     };
     let odds = |x: f64| {
-        // What was there while the part was closed, a wall behind a lid, is not the part.
+        // What was there while the part was closed, a wall behind a lid, is not the part: its place was seen empty.
         let motion = joint.motion(x);
         let was_free = |p: &Point| {
             let at = motion * p;
-            !clip.closed.iter().any(|view| view.gap(&at).is_some_and(|(gap, _)| gap.abs() < TIGHT_M))
+            let gaps = || clip.closed.iter().filter_map(|view| view.gap(&at)).map(|(gap, _)| gap);
+            gaps().any(|gap| gap >= TIGHT_M) && !gaps().any(|gap| gap.abs() < TIGHT_M)
         };
         let seen: Vec<f64> = of_sort.iter().map(|s| leaf::odds(leaf, joint, x, s.view, was_free)).collect();
         stats::median(&seen).unwrap_or(0.0)
