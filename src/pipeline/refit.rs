@@ -17,6 +17,10 @@ use crate::math::{Point, stats};
 use crate::recording::sketch::Sketch;
 use crate::recording::{Clip, Recording};
 
+/// Error of a place that no number of views makes smaller, metres: depth is off alike wherever the same surface is seen from
+/// about the same distance.
+const SPOT_STD_M: f64 = 0.015;
+
 /// A joint after its open views were looked at.
 pub(super) struct Refitted<'a> {
     pub(super) joint: Articulation,
@@ -93,7 +97,11 @@ pub(super) fn refitted<'a>(
     let shared = config.inference.shared_errors;
     let depth = OpenStates {
         across: fit.across,
-        hinge_cov_m2: fit.hinge_cov_m2.map(|rows| rows.map(|row| row.map(|x| shared * x))),
+        hinge_cov_m2: fit.hinge_cov_m2.map(|rows| {
+            std::array::from_fn(|i| {
+                std::array::from_fn(|k| shared * rows[i][k] + if i == k { SPOT_STD_M * SPOT_STD_M } else { 0.0 })
+            })
+        }),
         moved_std: ends.iter().zip(&begins).map(|(end, begin)| shared.sqrt() * end.std.hypot(begin.std)).collect(),
     };
     let openings = fit.openings.iter().flatten().map(|o| o.value).collect();
