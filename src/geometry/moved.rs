@@ -33,7 +33,7 @@ pub enum Hold {
     Free,
     /// The hand went out of sight while it held the part, which may still be on its way.
     Lost,
-    /// As `Lost`, but after the narration's end (closing: before its start): the part stands.
+    /// Well after the hand was seen last and after the narration's end (closing: before its start): the part stands.
     Left,
 }
 
@@ -135,17 +135,18 @@ pub fn open_frames(recording: &Recording, clip: &Clip, trajectory: &Trajectory) 
         frames.extend((0..count).map(|i| OpenFrame { frame: free[i * free.len() / count], grip, hold }));
     };
     let end = if trajectory.action == Action::Open { last } else { first };
-    if trajectory.open_end_seen() {
-        after(end, Hold::Free);
-    } else {
-        // A hand that was lost may have moved the part until the narration ends.
-        let stands = match trajectory.action {
-            Action::Open => last.max(clip.end_frame),
-            Action::Close => first.min(clip.start_frame),
-        };
-        if stands.abs_diff(end) > 4 * FREE {
-            after(end, Hold::Lost);
-        }
+    // Contact flags err, and a hand that was lost may have moved the part on: after the narration it stands.
+    let stands = match trajectory.action {
+        Action::Open => last.max(clip.end_frame),
+        Action::Close => first.min(clip.start_frame),
+    };
+    let moves_on = stands.abs_diff(end) > 4 * FREE;
+    match trajectory.open_end_seen() {
+        true => after(end, Hold::Free),
+        false if moves_on => after(end, Hold::Lost),
+        false => {}
+    }
+    if moves_on || !trajectory.open_end_seen() {
         after(stands, Hold::Left);
     }
     frames
