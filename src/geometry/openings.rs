@@ -80,12 +80,15 @@ struct Seen<'a> {
     hand: f64,
     /// Radian or metre that the hand's error is worth.
     std: f64,
+    /// The closed state of its clip.
+    closed: &'a [View<'a>],
 }
 
 /// Fits the hinge and the opening in every view. `None` where no view sees enough of the leaf in motion.
 #[must_use]
 pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState], noise: &Noise) -> Option<Refit> {
     let lever = |clip: &OpenState| joint.lever(&clip.grip).max(LEAST_LEVER_M);
+    let leaf = Leaf::of(face, rect, noise.board_m);
     let seen: Vec<Vec<Seen>> = clips
         .iter()
         .map(|clip| {
@@ -93,12 +96,16 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
                 .iter()
                 .map(|view| {
                     let std = view.hold.std_m(clip.grip_std_m) / lever(clip);
-                    Seen { view, hand: joint.opening_at(&clip.grip, &view.grip), std }
+                    Seen {
+                        view,
+                        hand: joint.opening_at(&clip.grip, &view.grip),
+                        std,
+                        closed: if in_front(&leaf, joint) { &[] } else { clip.closed },
+                    }
                 })
                 .collect()
         })
         .collect();
-    let leaf = Leaf::of(face, rect, noise.board_m);
     // One offset a clip first (a hand is off by as much all along a clip; after it was lost, another), then each view by
     // itself.
     let mut offsets: Vec<Vec<f64>> = seen
@@ -186,6 +193,16 @@ fn displacement(leaf: &Leaf, point: &Point, joint: &Articulation, opening: f64, 
     leaf.behind(point, joint, opening, view).filter(|b| b.way >= 2.0 * super::moved::tolerance(b.depth))
 }
 
+/// Whether a leaf slides along its front, where it shows no depth of its own.
+fn in_front(leaf: &Leaf, joint: &Articulation) -> bool {
+    joint.kind == JointKind::Prismatic && joint.axis.dot(&leaf.normal()).abs() < IN_FACE
+}
+
+/// Whether one of the views of the closed state sees a surface at a point (world).
+fn was_there(closed: &[View], at: &Point) -> bool {
+    closed.iter().any(|view| view.gap(at).is_some_and(|(gap, _)| gap.abs() < TIGHT_M))
+}
+
 fn weight(residual: f64, scale: f64) -> f64 {
     let x = residual / scale;
     1.0 / ((1.0 + x * x) * (1.0 + x * x))
@@ -226,9 +243,7 @@ fn standing(leaf: &Leaf, joint: &Articulation, clip: &OpenState, views: &[Seen],
     const WIDEST: [f64; 2] = [2.5, 0.8];
     let of_sort: Vec<&Seen> = views.iter().filter(|s| s.view.hold == hold).collect();
     let Some(first) = of_sort.first() else { return offset };
-    let slides_in_front = joint.kind == JointKind::Prismatic && joint.axis.dot(&leaf.normal()).abs() < IN_FACE;
-    // Along its front a leaf shows no depth of its own.
-    if slides_in_front {
+    if in_front(leaf, joint) {
         return offset;
     }
     let reach = leaf.points().iter().map(|p| joint.lever(p)).fold(LEAST_LEVER_M, f64::max);
@@ -241,8 +256,8 @@ fn standing(leaf: &Leaf, joint: &Articulation, clip: &OpenState, views: &[Seen],
         let motion = joint.motion(x);
         let was_free = |p: &Point| {
             let at = motion * p;
-            let gaps = || clip.closed.iter().filter_map(|view| view.gap(&at)).map(|(gap, _)| gap);
-            gaps().any(|gap| gap >= TIGHT_M) && !gaps().any(|gap| gap.abs() < TIGHT_M)
+            clip.closed.iter().any(|v| v.gap(&at).is_some_and(|(gap, _)| gap >= TIGHT_M))
+                && !was_there(clip.closed, &at)
         };
         let seen: Vec<f64> = of_sort.iter().map(|s| leaf::odds(leaf, joint, x, s.view, was_free)).collect();
         stats::median(&seen).unwrap_or(0.0)
@@ -320,6 +335,9 @@ fn normal_equations(
             .iter()
             .filter_map(|p| {
                 let Behind { along_normal, at, normal, .. } = displacement(leaf, p, joint, opening, s.view)?;
+                if was_there(s.closed, &at) {
+                    return None;
+                }
                 // How the leaf moves along its normal with each parameter.
                 let by_opening = match joint.kind {
                     JointKind::Revolute => joint.axis.cross(&(at - joint.origin)),
