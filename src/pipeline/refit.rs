@@ -11,6 +11,7 @@ use crate::geometry::moved::{self, Hold};
 use crate::geometry::openings::{self, OpenState, Opening};
 use crate::geometry::{Face, Rect, outline};
 use crate::hands::{self, Trajectory};
+use crate::inference;
 use crate::inference::uncertainty::OpenStates;
 use crate::localization;
 use crate::math::{Point, stats};
@@ -184,9 +185,28 @@ fn closed_end(
     let known = ajar::Known {
         end: end.value,
         went: joint.opening_at(&state.grip, &trajectory.open_grip()),
-        went_std: trajectory.ends_seen.map(hands::grip_std_m).into_iter().fold(0.0, f64::hypot) / lever,
+        went_std: way_std_m(trajectory) / lever,
     };
     ajar::ajar(&closed.face, &closed.rect, joint, state.closed, &known, config.fitting.board_m)
+}
+
+/// The openings that the hands alone tell, rad or m: each clip's, made one where a clip closes what the one before it opened.
+pub(super) fn by_hand(shown: &[(&ClipResult, &Trajectory)], joint: &Articulation) -> Vec<f64> {
+    let ends: Vec<Opening> = shown
+        .iter()
+        .map(|(_, t)| {
+            let grip = t.closed_grip();
+            let value = inference::observed_range(joint, &grip, &t.positions());
+            let std = way_std_m(t) / joint.lever(&grip).max(openings::LEAST_LEVER_M);
+            Opening { value, std, informed: false }
+        })
+        .collect();
+    left_where_found(shown, &ends).iter().map(|end| end.value).collect()
+}
+
+/// Standard deviation of the way of a hand, metres: of both of its ends.
+fn way_std_m(trajectory: &Trajectory) -> f64 {
+    trajectory.ends_seen.map(hands::grip_std_m).into_iter().fold(0.0, f64::hypot)
 }
 
 /// A part stays where it was left: the open end of a clip is where the next clip of the part finds it. Both clips' values

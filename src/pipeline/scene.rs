@@ -362,8 +362,12 @@ fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around) -> Hy
     let mut joint = inference::opening_sense(likely.joint, face.as_ref(), &judged.grip, trajectories);
     let mut depth = None;
     let mut part = clips[best].part;
-    let mut moved: Vec<f64> =
-        shown.iter().map(|(_, t)| inference::observed_range(&joint, &t.closed_grip(), &t.positions())).collect();
+    let mut moved: Vec<f64> = match config.inference.method {
+        InferenceMethod::Posterior => refit::by_hand(&shown, &joint),
+        InferenceMethod::Paper => {
+            shown.iter().map(|(_, t)| inference::observed_range(&joint, &t.closed_grip(), &t.positions())).collect()
+        }
+    };
     let mut widest = moved.iter().copied().fold(0.0, f64::max);
     // A part of which no outline was seen to move: the piece of it around the grip.
     let rect = part.unwrap_or(outline::SMALLEST);
