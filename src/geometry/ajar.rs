@@ -32,19 +32,25 @@ pub fn ajar(face: &Face, rect: &Rect, joint: &Articulation, views: &[View], know
     let reach = leaf.points().iter().map(|p| joint.lever(p)).fold(0.0, f64::max);
     let step = (STEP_M / reach.max(openings::LEAST_LEVER_M)).max(known.end / MOST_STEPS as f64);
     let at: Vec<f64> = (1..).map(|k| f64::from(k) * step).take_while(|x| *x < known.end).collect();
-    let before: Vec<View> = views.iter().filter(|view| leaf::shows(&leaf, joint, view)).copied().collect();
+    let before: Vec<&View> = views.iter().filter(|view| leaf::shows(&leaf, view)).collect();
     if at.is_empty() || before.is_empty() {
         return shut;
     }
     let by_hand = |x: f64| openings::hand_log((known.end - x - known.went) / known.went_std);
-    let seen: Vec<Vec<f64>> =
-        before.iter().map(|view| at.iter().map(|&x| leaf::odds(&leaf, joint, x, view, |_| true)).collect()).collect();
+    let seen: Vec<Vec<f64>> = before
+        .iter()
+        .map(|view| {
+            let bias_m = leaf::front_bias_m(face, rect, view);
+            at.iter().map(|&x| leaf::odds(&leaf, joint, x, view, bias_m, None)).collect()
+        })
+        .collect();
     let best: Vec<f64> = seen.iter().map(|odds| odds.iter().copied().fold(0.0, f64::max)).collect();
     let weights: Vec<f64> = at
         .iter()
         .enumerate()
         .map(|(k, &x)| {
-            // A part that stands ajar does so in every view; one that is still on its way is elsewhere in each.
+            // A part that stands ajar does so in every view; one that is still on its way is elsewhere in each. A view that tells
+            // nothing of a place does not vouch for it.
             if seen.iter().zip(&best).any(|(odds, best)| odds[k] <= 0.0 || odds[k] < best - openings::BY_FAR) {
                 return 0.0;
             }

@@ -177,6 +177,12 @@ pub fn collect(evidence: &Evidence, config: &config::Inference) -> Vec<AxisCandi
 /// within its face.
 pub const IN_FACE: f64 = 0.3;
 
+/// Whether a joint slides along a front of that outward normal, where a leaf shows no depth of its own.
+#[must_use]
+pub fn within_front(joint: &Articulation, normal: &Vector) -> bool {
+    joint.kind == JointKind::Prismatic && joint.axis.dot(normal).abs() < IN_FACE
+}
+
 /// Share of the grip's first motion that leaves the face, -1..1; not a number for a hinge through the grip.
 #[must_use]
 pub fn outwardness(joint: &Articulation, face: &Face, grip: &Point) -> f64 {

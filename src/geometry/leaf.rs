@@ -4,14 +4,14 @@ use super::Face;
 use super::face::Rect;
 use super::moved::{GRAZING, View};
 use crate::articulation::Articulation;
-use crate::math::{Point, Vector, unit};
+use crate::math::{Point, Pose, Vector, stats, unit};
 
 /// Error of a frame's depth at one point of a surface, beside the one that all its points share, metres. It bends over a few
 /// decimetres, so a leaf is worth few points.
 pub(super) const OWN_STD_M: f64 = 0.015;
 pub(super) const INDEPENDENT: f64 = 30.0;
-/// Of the leaf's place against the front it was fitted to, shared by all points of a view, metres: of the plane and of the
-/// view's depth.
+/// Of the leaf's place against the front it was fitted to, shared by all points of a view, metres: of the plane (1.5 cm) and of
+/// the view's depth (1 cm).
 const SHARED_STD_M: f64 = 0.018;
 /// Beyond this a view looks past the leaf or at what hides it, metres.
 pub(super) const TIGHT_M: f64 = 0.03;
@@ -63,9 +63,8 @@ impl Leaf {
         &self.points
     }
 
-    /// What a view sees where `point` (closed, world) is at `opening`. `None` where nothing is seen or at a grazing slant.
-    pub(super) fn behind(&self, point: &Point, joint: &Articulation, opening: f64, view: &View) -> Option<Behind> {
-        let motion = joint.motion(opening);
+    /// What a view sees where `motion` takes `point` (closed, world). `None` where nothing is seen or at a grazing slant.
+    pub(super) fn behind(&self, point: &Point, motion: &Pose, view: &View) -> Option<Behind> {
         let normal = motion.rotation * self.normal;
         let front = motion * point;
         let ray = unit(&(front - view.eye))?;
@@ -81,25 +80,58 @@ impl Leaf {
     }
 }
 
-/// Points of the leaf that have to be seen, of all.
+/// Share of the leaf's points that have to be seen; half of a leaf is hidden by what it is opened for, more is no leaf.
 const LEAST_SEEN: f64 = 0.3;
 
 /// Whether a view sees the place of the closed leaf.
-pub(super) fn shows(leaf: &Leaf, joint: &Articulation, view: &View) -> bool {
-    let seen = leaf.points().iter().filter(|p| leaf.behind(p, joint, 0.0, view).is_some()).count();
+pub(super) fn shows(leaf: &Leaf, view: &View) -> bool {
+    let shut = Pose::identity();
+    let seen = leaf.points().iter().filter(|p| leaf.behind(p, &shut, view).is_some()).count();
     seen as f64 >= LEAST_SEEN * leaf.points().len() as f64
 }
 
+/// How far the front beside the leaf lies behind the face in a view, metres: an error of that view's depth, which the leaf
+/// shares. Zero where too little of the front is seen.
+pub(super) fn front_bias_m(face: &Face, rect: &Rect, view: &View) -> f64 {
+    /// What is further off is another surface, metres.
+    const SAME_M: f64 = 0.1;
+    const LEAST: usize = 20;
+    let beside = |p: &Point| {
+        let at = face.coordinates(p);
+        (0..2).any(|k| at[k] < rect.bounds[k][0] || at[k] > rect.bounds[k][1])
+    };
+    let front = Leaf::of(face, &Rect { bounds: face.extent }, 0.0);
+    let shut = Pose::identity();
+    let off: Vec<f64> = front
+        .points()
+        .iter()
+        .filter(|p| beside(p))
+        .filter_map(|p| front.behind(p, &shut, view))
+        .map(|seen| seen.along_normal)
+        .filter(|off| off.abs() < SAME_M)
+        .collect();
+    if off.len() < LEAST { 0.0 } else { stats::median(&off).unwrap_or(0.0) }
+}
+
 /// Log odds of a leaf that stands at `x` (rad or m) against one that is shut, from one view's depth; zero where it shows too
-/// little of either place. Of the leaf those points count that `counts` has.
-pub(super) fn odds(leaf: &Leaf, joint: &Articulation, x: f64, view: &View, counts: impl Fn(&Point) -> bool) -> f64 {
+/// little of either place. Of the leaf's points those count that `counts` says, or all; `bias_m` is the view's, as [`front_bias_m`].
+pub(super) fn odds(
+    leaf: &Leaf,
+    joint: &Articulation,
+    x: f64,
+    view: &View,
+    bias_m: f64,
+    counts: Option<&[bool]>,
+) -> f64 {
+    let (motion, shut) = (joint.motion(x), Pose::identity());
     let both: Vec<[f64; 2]> = leaf
         .points()
         .iter()
-        .filter(|p| counts(p))
-        .filter_map(|p| {
-            let behind = |opening: f64| leaf.behind(p, joint, opening, view).map(|seen| seen.along_normal);
-            Some([behind(x)?, behind(0.0)?])
+        .enumerate()
+        .filter(|(i, _)| counts.is_none_or(|c| c.get(*i).copied().unwrap_or(false)))
+        .filter_map(|(_, p)| {
+            let behind = |motion: &Pose| leaf.behind(p, motion, view).map(|seen| seen.along_normal - bias_m);
+            Some([behind(&motion)?, behind(&shut)?])
         })
         .collect();
     if (both.len() as f64) < LEAST_SEEN * leaf.points().len() as f64 {

@@ -102,7 +102,7 @@ pub struct OpenFrame {
 }
 
 /// Frames of the open state, with the grip where the hand holds the part in them: while the hand holds it far from closed,
-/// and just after or before it does.
+/// just after or before it does, and after (closing: before) the narration.
 #[must_use]
 pub fn open_frames(recording: &Recording, clip: &Clip, trajectory: &Trajectory) -> Vec<OpenFrame> {
     const HELD: usize = 6;
@@ -141,12 +141,17 @@ pub fn open_frames(recording: &Recording, clip: &Clip, trajectory: &Trajectory) 
         Action::Close => first.min(clip.start_frame),
     };
     let moves_on = stands.abs_diff(end) > 4 * FREE;
+    let way = end.min(stands)..=end.max(stands);
+    let undisturbed = !recording.clips.iter().any(|c| {
+        c.clip != clip.clip && c.end_frame > c.start_frame && c.start_frame < *way.end() && c.end_frame > *way.start()
+    });
     match trajectory.open_end_seen() {
         true => after(end, Hold::Free),
         false if moves_on => after(end, Hold::Lost),
         false => {}
     }
-    if moves_on || !trajectory.open_end_seen() {
+    // What another clip moved meanwhile may be this part.
+    if undisturbed && (moves_on || !trajectory.open_end_seen()) {
         after(stands, Hold::Left);
     }
     frames

@@ -7,13 +7,13 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::Face;
-use super::candidates::IN_FACE;
+use super::candidates::within_front;
 use super::face::Rect;
 use super::leaf::{self, Behind, INDEPENDENT, Leaf, OWN_STD_M, TIGHT_M};
 use super::moved::{Hold, View};
 use super::sights::{self, Sights};
 use crate::articulation::{Articulation, JointKind};
-use crate::math::{Point, Vector, any_orthogonal, reject, stats, unit};
+use crate::math::{Point, Pose, Vector, any_orthogonal, reject, stats, unit};
 
 /// The views of one clip's open state, with the grip when closed as that clip's hand has it.
 #[derive(Debug, Clone, Copy)]
@@ -100,7 +100,7 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
                         view,
                         hand: joint.opening_at(&clip.grip, &view.grip),
                         std,
-                        closed: if in_front(&leaf, joint) { &[] } else { clip.closed },
+                        closed: if within_front(joint, &face.normal) { &[] } else { clip.closed },
                     }
                 })
                 .collect()
@@ -115,7 +115,11 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
             let sights = Sights::of(face, Some(rect), clip.views);
             let of = Hold::ALL.map(|hold| {
                 let offset = coarse(&sights, joint, clip, views, hold, lever(clip));
-                if hold == Hold::Sure { offset } else { standing(&leaf, joint, clip, views, hold, offset) }
+                // A part that was let go stands; one whose hand was lost may be on its way.
+                match hold {
+                    Hold::Free | Hold::Left => standing(&leaf, joint, clip, views, hold, offset),
+                    Hold::Sure | Hold::Lost => offset,
+                }
             });
             views.iter().map(|s| of[s.view.hold as usize]).collect()
         })
@@ -189,13 +193,8 @@ fn shifted(joint: &Articulation, e1: &Vector, e2: &Vector, shift: [f64; 2]) -> A
 }
 
 /// As [`Leaf::behind`], but for points that have left their closed place: near it a leaf cannot be told from what is behind it.
-fn displacement(leaf: &Leaf, point: &Point, joint: &Articulation, opening: f64, view: &View) -> Option<Behind> {
-    leaf.behind(point, joint, opening, view).filter(|b| b.way >= 2.0 * super::moved::tolerance(b.depth))
-}
-
-/// Whether a leaf slides along its front, where it shows no depth of its own.
-fn in_front(leaf: &Leaf, joint: &Articulation) -> bool {
-    joint.kind == JointKind::Prismatic && joint.axis.dot(&leaf.normal()).abs() < IN_FACE
+fn displacement(leaf: &Leaf, point: &Point, motion: &Pose, view: &View) -> Option<Behind> {
+    leaf.behind(point, motion, view).filter(|b| b.way >= 2.0 * super::moved::tolerance(b.depth))
 }
 
 /// Whether one of the views of the closed state sees a surface at a point (world).
@@ -239,11 +238,11 @@ pub(super) fn hand_log(x: f64) -> f64 {
 /// better by far. A leaf that was left near its closed place, or far from where the hand was lost, is found so only.
 fn standing(leaf: &Leaf, joint: &Articulation, clip: &OpenState, views: &[Seen], hold: Hold, offset: f64) -> f64 {
     const STEP_M: f64 = 0.01;
-    /// No part opens further, rad and m.
-    const WIDEST: [f64; 2] = [2.5, 0.8];
+    /// No part opens further, rad and m: half a turn, and the longest pull-out.
+    const WIDEST: [f64; 2] = [std::f64::consts::PI, 1.0];
     let of_sort: Vec<&Seen> = views.iter().filter(|s| s.view.hold == hold).collect();
     let Some(first) = of_sort.first() else { return offset };
-    if in_front(leaf, joint) {
+    if within_front(joint, &leaf.normal()) {
         return offset;
     }
     let reach = leaf.points().iter().map(|p| joint.lever(p)).fold(LEAST_LEVER_M, f64::max);
@@ -259,7 +258,8 @@ fn standing(leaf: &Leaf, joint: &Articulation, clip: &OpenState, views: &[Seen],
             clip.closed.iter().any(|v| v.gap(&at).is_some_and(|(gap, _)| gap >= TIGHT_M))
                 && !was_there(clip.closed, &at)
         };
-        let seen: Vec<f64> = of_sort.iter().map(|s| leaf::odds(leaf, joint, x, s.view, was_free)).collect();
+        let free: Vec<bool> = leaf.points().iter().map(was_free).collect();
+        let seen: Vec<f64> = of_sort.iter().map(|s| leaf::odds(leaf, joint, x, s.view, 0.0, Some(&free))).collect();
         stats::median(&seen).unwrap_or(0.0)
     };
     let weighed = |x: f64, seen: f64| seen + hand_log((x - first.hand) / first.std);
@@ -329,12 +329,13 @@ fn normal_equations(
         matrix[(slot + 1, slot + 1)] += SHARED_STD_M.powi(-2);
         vector[slot + 1] -= bias / (SHARED_STD_M * SHARED_STD_M);
         let opening = s.hand + offset;
-        let turn = joint.motion(opening).rotation;
+        let motion = joint.motion(opening);
+        let turn = motion.rotation;
         let rows: Vec<([f64; 4], f64, f64)> = leaf
             .points()
             .iter()
             .filter_map(|p| {
-                let Behind { along_normal, at, normal, .. } = displacement(leaf, p, joint, opening, s.view)?;
+                let Behind { along_normal, at, normal, .. } = displacement(leaf, p, &motion, s.view)?;
                 if was_there(s.closed, &at) {
                     return None;
                 }

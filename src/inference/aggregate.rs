@@ -30,12 +30,21 @@ pub struct Held<'a> {
     pub joint: Option<Articulation>,
 }
 
+/// A clip that moves something, in which no hand was followed.
+#[derive(Debug, Clone, Copy)]
+pub struct Missed<'a> {
+    /// How many of the clips with a hand come before it.
+    pub after: usize,
+    /// The furniture's name, where the narration has one.
+    pub furniture: Option<&'a str>,
+}
+
 /// Groups clips that show one part, given in the order of time. Returns indices into `clips`.
 ///
 /// Two clips belong together if the grip was at the same place of the same face when closed; or if one closes what the other
 /// left open: people take hold of a part where they left it, and what is closed was open.
 #[must_use]
-pub fn group(clips: &[Held], config: &config::Inference) -> Vec<Vec<usize>> {
+pub fn group(clips: &[Held], missed: &[Missed], config: &config::Inference) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (i, clip) in clips.iter().enumerate() {
         if !config.merge_clips {
@@ -47,10 +56,12 @@ pub fn group(clips: &[Held], config: &config::Inference) -> Vec<Vec<usize>> {
             |g: &Vec<usize>| g.iter().map(|&j| (clips[j].closed - clip.closed).norm()).fold(f64::INFINITY, f64::min);
         let same = |g: &usize| groups[*g].iter().any(|&j| same_place(&clips[j], clip, config));
         let home =
-            groups.iter().position(continues).or_else(|| only_one_open(&groups, clips, i, config)).or_else(|| {
-                let nearest = |a: &usize, b: &usize| distance(&groups[*a]).total_cmp(&distance(&groups[*b]));
-                (0..groups.len()).filter(same).min_by(nearest)
-            });
+            groups.iter().position(continues).or_else(|| only_one_open(&groups, clips, missed, i, config)).or_else(
+                || {
+                    let nearest = |a: &usize, b: &usize| distance(&groups[*a]).total_cmp(&distance(&groups[*b]));
+                    (0..groups.len()).filter(same).min_by(nearest)
+                },
+            );
         match home {
             Some(home) => groups[home].push(i),
             None => groups.push(vec![i]),
@@ -62,7 +73,13 @@ pub fn group(clips: &[Held], config: &config::Inference) -> Vec<Vec<usize>> {
 /// The part that clip `i` closes because no other of its name stands open within reach of the hand's way. Hands that were seen
 /// badly or in part only are far apart even on one part; what was left open decides then. Where the furniture has no name,
 /// only the clip before counts.
-fn only_one_open(groups: &[Vec<usize>], clips: &[Held], i: usize, config: &config::Inference) -> Option<usize> {
+fn only_one_open(
+    groups: &[Vec<usize>],
+    clips: &[Held],
+    missed: &[Missed],
+    i: usize,
+    config: &config::Inference,
+) -> Option<usize> {
     let clip = &clips[i];
     if clip.action != Action::Close {
         return None;
@@ -74,8 +91,14 @@ fn only_one_open(groups: &[Vec<usize>], clips: &[Held], i: usize, config: &confi
                 (Some(a), Some(b)) => a == b,
                 _ => j + 1 == i,
             };
+            // What nobody saw may have closed that one, or opened another.
+            let unseen = missed
+                .iter()
+                .any(|m| (j + 1..=i).contains(&m.after) && m.furniture.zip(clip.furniture).is_none_or(|(a, b)| a == b));
             before.action == Action::Open
                 && named
+                && !unseen
+                && (j + 1 == i || faces_agree(before, clip, config))
                 && names_agree(before, clip)
                 && apart(before.path, clip.path) <= config.merge_open_m
         })
@@ -100,15 +123,18 @@ fn closes(a: &Held, b: &Held, config: &config::Inference) -> bool {
         && (a.open - b.open).norm() <= config.merge_grip_m
 }
 
+fn faces_agree(a: &Held, b: &Held, config: &config::Inference) -> bool {
+    a.normal.zip(b.normal).is_none_or(|(a, b)| signed_angle(&a, &b) <= config.merge_angle_deg.to_radians())
+}
+
 /// Whether the grips coincide when closed.
 fn same_place(a: &Held, b: &Held, config: &config::Inference) -> bool {
-    let faces_agree = match (a.normal, b.normal) {
-        (Some(a), Some(b)) => signed_angle(&a, &b) <= config.merge_angle_deg.to_radians(),
-        _ => true,
-    };
     // A part is opened and closed in turn: two openings in a row are two parts unless their grips nearly coincide.
     let limit = if a.action == b.action { 0.6 * config.merge_grip_m } else { config.merge_grip_m };
-    faces_agree && (a.closed - b.closed).norm() <= limit && outlines_agree(a, b) && joints_agree(a, b)
+    faces_agree(a, b, config)
+        && (a.closed - b.closed).norm() <= limit
+        && outlines_agree(a, b)
+        && hinges_agree(a.joint, b.joint)
 }
 
 /// Handles of neighbours can be a hand's width apart; the parts behind them do not overlap. An outline that was seen badly
@@ -131,8 +157,16 @@ struct Shared {
 }
 
 fn shared((face, mine): (&Face, &Rect), (other_face, theirs): (&Face, &Rect)) -> Shared {
-    let [right, up, _] = face.coordinates(&other_face.center);
-    let theirs = [theirs.bounds[0].map(|x| x + right), theirs.bounds[1].map(|x| x + up)];
+    // A lid's axes lie as the person stood: the other outline is turned onto this face.
+    let corners = [0, 1, 2, 3].map(|i| {
+        let at = face.coordinates(&other_face.point(theirs.bounds[0][i % 2], theirs.bounds[1][i / 2], 0.0));
+        [at[0], at[1]]
+    });
+    let along = |k: usize| {
+        let at = corners.map(|c| c[k]);
+        [at.into_iter().fold(f64::INFINITY, f64::min), at.into_iter().fold(f64::NEG_INFINITY, f64::max)]
+    };
+    let theirs = [along(0), along(1)];
     let both: f64 =
         (0..2).map(|k| (mine.bounds[k][1].min(theirs[k][1]) - mine.bounds[k][0].max(theirs[k][0])).max(0.0)).product();
     let [a, b] = [mine.bounds, theirs].map(|b| (b[0][1] - b[0][0]) * (b[1][1] - b[1][0]));
@@ -148,6 +182,8 @@ pub struct Front {
     pub rect: Rect,
     /// Where it was held, world.
     pub grip: Point,
+    /// The joint, where its type is sure.
+    pub joint: Option<Articulation>,
 }
 
 /// Which of the groups are one part after all: no two parts cover the same piece of a face. Indices into `fronts`, each group
@@ -184,14 +220,15 @@ fn cover_one_place(a: &Front, b: &Front, config: &config::Inference) -> bool {
         (0..2).all(|k| at[k] >= on.rect.bounds[k][0] - GRIP_M && at[k] <= on.rect.bounds[k][1] + GRIP_M)
     };
     let shared = shared((&a.face, &a.rect), (&b.face, &b.rect));
-    signed_angle(&a.face.normal, &b.face.normal) <= config.merge_angle_deg.to_radians()
+    hinges_agree(a.joint, b.joint)
+        && signed_angle(&a.face.normal, &b.face.normal) <= config.merge_angle_deg.to_radians()
         && a.face.coordinates(&b.face.center)[2].abs() <= DEEPER_M
         && (shared.iou >= NEARLY_ONE || (shared.of_smaller >= LEAST_SHARE && holds(a, &b.grip) && holds(b, &a.grip)))
 }
 
 /// Two doors side by side are hinged at their outer edges: both hinges are sure and far apart.
-fn joints_agree(a: &Held, b: &Held) -> bool {
-    let (Some(a), Some(b)) = (&a.joint, &b.joint) else { return true };
+fn hinges_agree(a: Option<Articulation>, b: Option<Articulation>) -> bool {
+    let (Some(a), Some(b)) = (a, b) else { return true };
     if a.kind != JointKind::Revolute || b.kind != JointKind::Revolute {
         return true;
     }
@@ -264,7 +301,7 @@ mod tests {
             held(Action::Close, [0.0, 0.02, 0.52], [0.0, 0.38, 0.5]),
             held(Action::Close, [0.0, 0.02, 0.69], [0.0, 0.4, 0.7]),
         ];
-        assert_eq!(group(&clips, &config::Inference::default()), [vec![0, 3], vec![1, 2]]);
+        assert_eq!(group(&clips, &[], &config::Inference::default()), [vec![0, 3], vec![1, 2]]);
     }
 
     #[test]
@@ -273,7 +310,7 @@ mod tests {
             held(Action::Open, [0.0, 0.0, 0.7], [0.3, 0.4, 0.7]),
             held(Action::Close, [0.25, 0.3, 0.7], [0.31, 0.42, 0.72]),
         ];
-        assert_eq!(group(&clips, &config::Inference::default()), [vec![0, 1]]);
+        assert_eq!(group(&clips, &[], &config::Inference::default()), [vec![0, 1]]);
     }
 
     #[test]
@@ -288,19 +325,25 @@ mod tests {
         let config = config::Inference::default();
         // Seen 25 cm apart, with another drawer opened in between.
         let clips = [drawer(Action::Open, here), drawer(Action::Open, far), drawer(Action::Close, near)];
-        assert_eq!(group(&clips, &config), [vec![0, 2], vec![1]]);
+        assert_eq!(group(&clips, &[], &config), [vec![0, 2], vec![1]]);
         // Two stand open: the distance alone does not tell.
         let clips = [drawer(Action::Open, here), drawer(Action::Open, at(0.5).leak()), drawer(Action::Close, near)];
-        assert_eq!(group(&clips, &config).len(), 3);
+        assert_eq!(group(&clips, &[], &config).len(), 3);
         // Closed already, and another name.
         let closed = drawer(Action::Close, here);
-        assert_eq!(group(&[drawer(Action::Open, here), closed, drawer(Action::Close, near)], &config).len(), 2);
+        assert_eq!(group(&[drawer(Action::Open, here), closed, drawer(Action::Close, near)], &[], &config).len(), 2);
         let oven = Held { furniture: Some("oven"), ..drawer(Action::Close, near) };
-        assert_eq!(group(&[drawer(Action::Open, here), oven], &config).len(), 2);
+        assert_eq!(group(&[drawer(Action::Open, here), oven], &[], &config).len(), 2);
+        // A clip that nobody saw in between, unless it is of another name.
+        let unseen = |furniture| [Missed { after: 1, furniture }];
+        let clips = [drawer(Action::Open, here), drawer(Action::Close, near)];
+        assert_eq!(group(&clips, &unseen(Some("drawer")), &config).len(), 2);
+        assert_eq!(group(&clips, &unseen(None), &config).len(), 2);
+        assert_eq!(group(&clips, &unseen(Some("oven")), &config).len(), 1);
         // Without a name, right after it only.
         let it = Held { furniture: None, ..drawer(Action::Close, near) };
-        assert_eq!(group(&[drawer(Action::Open, here), it], &config).len(), 1);
-        assert_eq!(group(&[drawer(Action::Open, here), drawer(Action::Open, far), it], &config).len(), 3);
+        assert_eq!(group(&[drawer(Action::Open, here), it], &[], &config).len(), 1);
+        assert_eq!(group(&[drawer(Action::Open, here), drawer(Action::Open, far), it], &[], &config).len(), 3);
     }
 
     #[test]
@@ -316,7 +359,7 @@ mod tests {
         let front = |depth: f64, [left, right]: [f64; 2], [low, high]: [f64; 2], grip: [f64; 2]| {
             let face = face(depth);
             let grip = face.center + face.right * grip[0] + face.up * grip[1];
-            Some(Front { face, rect: Rect { bounds: [[left, right], [low, high]] }, grip })
+            Some(Front { face, rect: Rect { bounds: [[left, right], [low, high]] }, grip, joint: None })
         };
         let config = config::Inference::default();
         let drawer = front(0.0, [-0.3, 0.3], [-0.1, 0.1], [0.0, 0.05]);
@@ -328,6 +371,18 @@ mod tests {
         let inner = front(-0.15, [-0.3, 0.3], [-0.1, 0.1], [0.0, 0.0]);
         assert_eq!(same_fronts(&[drawer, below, None, again], &config), [vec![0, 3], vec![1], vec![2]]);
         assert_eq!(same_fronts(&[tall, below, inner], &config), [vec![0], vec![1], vec![2]]);
+        // Hinges at both outer edges, under outlines that reach over both leaves.
+        let hinge =
+            |x: f64| Articulation { kind: JointKind::Revolute, axis: Vector::z(), origin: Point::new(x, 0.0, 0.5) };
+        let hung = |front: Option<Front>, x: f64| front.map(|f| Front { joint: Some(hinge(x)), ..f });
+        assert_eq!(same_fronts(&[hung(drawer, -0.3), hung(again, 0.3)], &config).len(), 2);
+        // A lid seen from its other side.
+        let turned = again.map(|f| {
+            let Rect { bounds: [[left, right], [low, high]] } = f.rect;
+            let rect = Rect { bounds: [[-right, -left], [-high, -low]] };
+            Front { face: Face { right: -f.face.right, up: -f.face.up, ..f.face }, rect, ..f }
+        });
+        assert_eq!(same_fronts(&[drawer, turned], &config).len(), 1);
         let apart = config::Inference { merge_clips: false, ..config };
         assert_eq!(same_fronts(&[drawer, again], &apart).len(), 2);
     }

@@ -3,13 +3,12 @@
 use std::collections::BTreeMap;
 
 use super::ClipResult;
-use crate::articulation::{Action, Articulation, JointKind};
+use crate::articulation::{Action, Articulation};
 use crate::config::Config;
 use crate::geometry::ajar;
-use crate::geometry::candidates::IN_FACE;
 use crate::geometry::moved::{self, Hold};
 use crate::geometry::openings::{self, OpenState, Opening};
-use crate::geometry::{Face, Rect, outline};
+use crate::geometry::{Face, Rect, candidates, outline};
 use crate::hands::{self, Trajectory};
 use crate::inference;
 use crate::inference::uncertainty::OpenStates;
@@ -114,8 +113,7 @@ pub(super) fn refitted<'a>(
 /// Along which of its front's axes (0 = right, 1 = up) a slide stays within the front; `None` for all other joints.
 fn within_front(joint: &Articulation, face: &Face) -> Option<usize> {
     let along = [face.right, face.up].map(|a| joint.axis.dot(&a).abs());
-    (joint.kind == JointKind::Prismatic && joint.axis.dot(&face.normal).abs() < IN_FACE)
-        .then(|| usize::from(along[1] > along[0]))
+    candidates::within_front(joint, &face.normal).then(|| usize::from(along[1] > along[0]))
 }
 
 /// Opening at the open end of a clip. After the hand let go the part stands there: what those views show counts, else what is
@@ -156,11 +154,14 @@ fn closed_views<'a>(
 ) -> Vec<moved::View<'a>> {
     let grip = trajectory.closed_grip();
     let [first, last] = trajectory.contact_frames();
-    let moves = |c: &Clip, frame: usize| c.end_frame > c.start_frame && (frame..first).contains(&c.end_frame);
+    if !config.localization.closed_state_frames {
+        return Vec::new();
+    }
+    let between = |c: &Clip, frame: usize| c.clip != clip.clip && c.start_frame < first && c.end_frame > frame;
     let frames: Vec<moved::OpenFrame> = localization::local_frames(recording, clip, trajectory, &config.localization)
         .into_iter()
         .filter(|&frame| match trajectory.action {
-            Action::Open => frame <= last && !recording.clips.iter().any(|c| moves(c, frame)),
+            Action::Open => frame <= last && !recording.clips.iter().any(|c| between(c, frame)),
             Action::Close => frame >= first,
         })
         .map(|frame| moved::OpenFrame { frame, grip, hold: Hold::Sure })

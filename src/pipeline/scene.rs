@@ -20,6 +20,9 @@ use crate::recording::Recording;
 use crate::recording::narration;
 use crate::recording::sketch::Sketch;
 
+/// Probability of its type above which a joint's hinge tells two parts apart.
+const SURE: f64 = 0.7;
+
 /// Clips to scene-level joints (§C.2).
 pub(super) fn merge(
     recording: &Recording,
@@ -50,10 +53,28 @@ pub(super) fn merge(
             furniture: named.as_ref().and_then(|r| r.furniture.as_deref()),
             kind: named.as_ref().and_then(|r| r.kind),
             part: clip.face.zip(clip.part),
-            joint: clip.joint.found().filter(|j| j.type_probability > 0.7).map(|j| j.joint),
+            joint: clip.joint.found().filter(|j| j.type_probability > SURE).map(|j| j.joint),
         })
         .collect();
-    let groups: Vec<Vec<usize>> = aggregate::group(&held, &config.inference)
+    let unseen: Vec<(usize, narration::Reading)> = clips
+        .iter()
+        .filter(|c| c.trajectory.is_none())
+        .map(|c| {
+            (
+                seen.iter().filter(|(.., s, _)| s.clip.start_frame <= c.clip.start_frame).count(),
+                narration::read(&c.clip),
+            )
+        })
+        .filter(|(_, reading)| reading.moves_joint == Some(true))
+        .collect();
+    let missed: Vec<aggregate::Missed> = unseen
+        .iter()
+        .map(|(after, r)| {
+            let furniture = Some(r).filter(|r| r.names_furniture()).and_then(|r| r.furniture.as_deref());
+            aggregate::Missed { after: *after, furniture }
+        })
+        .collect();
+    let groups: Vec<Vec<usize>> = aggregate::group(&held, &missed, &config.inference)
         .into_iter()
         .map(|g| g.into_iter().map(|i| seen[i].0).collect::<Vec<usize>>())
         .filter(|g| g.iter().any(|&c| clips[c].joint.found().is_some()))
@@ -63,7 +84,10 @@ pub(super) fn merge(
     loop {
         let fronts: Vec<Option<aggregate::Front>> = joints
             .iter()
-            .map(|(_, j)| j.face.zip(j.part).map(|(face, rect)| aggregate::Front { face, rect, grip: j.grip }))
+            .map(|(_, j)| {
+                let joint = Some(j.joint).filter(|_| j.type_probability > SURE);
+                j.face.zip(j.part).map(|(face, rect)| aggregate::Front { face, rect, grip: j.grip, joint })
+            })
             .collect();
         let sets = aggregate::same_fronts(&fronts, &config.inference);
         if sets.len() == joints.len() {
