@@ -12,7 +12,7 @@
 //!   approximation again, the same Fisher information.
 //! - An opening whose open state was seen: the same fit, all else integrated out; of a part that was found as it was
 //!   left, of both clips. What depth says of hinges and openings is widened (`inference.shared_errors`): its covariance is
-//!   multiplied.
+//!   multiplied, and a hinge has the error of one spot's depth that no number of views makes smaller.
 //! - Any other opening: the prior of a grip, and what the hinge's error adds to first order.
 
 use nalgebra::{Matrix2, Matrix3, Vector2};
@@ -41,7 +41,7 @@ pub struct Uncertainty {
     /// Covariance of the hinge along the two directions, at the middle of the part, m^2; none for slides.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub origin_cov_m2: Option<Covariance>,
-    /// Standard deviation of the largest opening that was observed, rad or m.
+    /// Standard deviation of the largest opening that a clip went through, rad or m.
     pub observed_range_std: f64,
     /// Standard deviation of the opening that each clip went through, rad or m.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
