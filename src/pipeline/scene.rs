@@ -37,10 +37,7 @@ pub(super) fn merge(
     // Clips may be listed in any order; people open before they close.
     seen.sort_by_key(|(i, c, _)| (c.clip.start_frame, *i));
     let paths: Vec<Vec<Point>> = seen.iter().map(|(.., trajectory)| trajectory.positions()).collect();
-    let named: Vec<Option<narration::Reading>> = seen
-        .iter()
-        .map(|(_, clip, _)| Some(narration::read(&clip.clip)).filter(narration::Reading::names_furniture))
-        .collect();
+    let named: Vec<Option<narration::Reading>> = seen.iter().map(|(_, clip, _)| naming(clip)).collect();
     let held: Vec<aggregate::Held> = seen
         .iter()
         .zip(paths.iter().zip(&named))
@@ -56,45 +53,62 @@ pub(super) fn merge(
             joint: clip.joint.found().filter(|j| j.type_probability > SURE).map(|j| j.joint),
         })
         .collect();
-    let unseen: Vec<(usize, narration::Reading)> = clips
-        .iter()
-        .filter(|c| c.trajectory.is_none())
-        .map(|c| {
-            (
-                seen.iter().filter(|(.., s, _)| s.clip.start_frame <= c.clip.start_frame).count(),
-                narration::read(&c.clip),
-            )
-        })
-        .filter(|(_, reading)| reading.moves_joint == Some(true))
-        .collect();
+    let unseen = unseen(&seen, clips);
     let missed: Vec<aggregate::Missed> = unseen
         .iter()
-        .map(|(after, r)| {
-            let furniture = Some(r).filter(|r| r.names_furniture()).and_then(|r| r.furniture.as_deref());
-            aggregate::Missed { after: *after, furniture }
-        })
+        .map(|(after, furniture)| aggregate::Missed { after: *after, furniture: furniture.as_deref() })
         .collect();
     let groups: Vec<Vec<usize>> = aggregate::group(&held, &missed, &config.inference)
         .into_iter()
         .map(|g| g.into_iter().map(|i| seen[i].0).collect::<Vec<usize>>())
         .filter(|g| g.iter().any(|&c| clips[c].joint.found().is_some()))
         .collect();
-    let mut joints = merged(recording, sketches, clips, &groups, reasoner, config);
-    // Outlines are known better once all clips of a part were judged together: groups may turn out to be one.
+    let first = merged(recording, sketches, clips, &groups, reasoner, config);
+    let again = |groups: &[Vec<usize>]| merged(recording, sketches, clips, groups, reasoner, config);
+    let mut joints: Vec<SceneJoint> =
+        regrouped(first, clips, again, config).into_iter().map(|(_, joint)| joint).collect();
+    for (i, joint) in joints.iter_mut().enumerate() {
+        joint.id = format!("joint_{i}");
+    }
+    joints
+}
+
+/// What a narration says that names the furniture.
+fn naming(clip: &ClipResult) -> Option<narration::Reading> {
+    Some(narration::read(&clip.clip)).filter(narration::Reading::names_furniture)
+}
+
+/// Clips that move something without a hand that was followed: how many of `seen` come before each, and the furniture's name.
+fn unseen(seen: &[(usize, &ClipResult, &Trajectory)], clips: &[ClipResult]) -> Vec<(usize, Option<String>)> {
+    let before = |c: &ClipResult| seen.iter().filter(|(_, s, _)| s.clip.start_frame <= c.clip.start_frame).count();
+    clips
+        .iter()
+        .filter(|c| c.trajectory.is_none() && narration::read(&c.clip).moves_joint == Some(true))
+        .map(|c| (before(c), naming(c).and_then(|r| r.furniture)))
+        .collect()
+}
+
+/// Groups with their joints, those whose fronts turn out to be one judged `again` together: outlines are known better once all
+/// clips of a part were judged together.
+fn regrouped(
+    mut joints: Vec<(Vec<usize>, SceneJoint)>,
+    clips: &[ClipResult],
+    again: impl Fn(&[Vec<usize>]) -> Vec<(Vec<usize>, SceneJoint)>,
+    config: &Config,
+) -> Vec<(Vec<usize>, SceneJoint)> {
+    let front = |joint: &SceneJoint| {
+        let sure = Some(joint.joint).filter(|_| joint.type_probability > SURE);
+        let (face, rect) = joint.face.zip(joint.part)?;
+        Some(aggregate::Front { face, rect, grip: joint.grip, joint: sure })
+    };
     loop {
-        let fronts: Vec<Option<aggregate::Front>> = joints
-            .iter()
-            .map(|(_, j)| {
-                let joint = Some(j.joint).filter(|_| j.type_probability > SURE);
-                j.face.zip(j.part).map(|(face, rect)| aggregate::Front { face, rect, grip: j.grip, joint })
-            })
-            .collect();
+        let fronts: Vec<Option<aggregate::Front>> = joints.iter().map(|(_, joint)| front(joint)).collect();
         let sets = aggregate::same_fronts(&fronts, &config.inference);
         if sets.len() == joints.len() {
-            break;
+            return joints;
         }
-        let (old, new): (Vec<_>, Vec<_>) = sets.into_iter().partition(|set| set.len() == 1);
-        let groups: Vec<Vec<usize>> = new
+        let (alone, together): (Vec<_>, Vec<_>) = sets.into_iter().partition(|set| set.len() == 1);
+        let groups: Vec<Vec<usize>> = together
             .iter()
             .map(|set| {
                 let mut members: Vec<usize> = set.iter().flat_map(|&j| joints[j].0.iter().copied()).collect();
@@ -102,15 +116,9 @@ pub(super) fn merge(
                 members
             })
             .collect();
-        let again = merged(recording, sketches, clips, &groups, reasoner, config);
-        joints = old.iter().flatten().map(|&j| joints[j].clone()).chain(again).collect();
+        joints = alone.iter().flatten().map(|&j| joints[j].clone()).chain(again(&groups)).collect();
         joints.sort_by_key(|(members, _)| members.first().map(|&c| (clips[c].clip.start_frame, c)));
     }
-    let mut joints: Vec<SceneJoint> = joints.into_iter().map(|(_, joint)| joint).collect();
-    for (i, joint) in joints.iter_mut().enumerate() {
-        joint.id = format!("joint_{i}");
-    }
-    joints
 }
 
 /// The groups that have a joint, and it.
