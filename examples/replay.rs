@@ -5,6 +5,8 @@
 //! TWIN is a folder that `paws twin` wrote. Told is, as JSON lines, the median of five runs on one thread, the world's making
 //! included; `benches/replay_side_by_side.py` sets other simulators beside it.
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command")]
+
 use std::path::Path;
 use std::time::Instant;
 
