@@ -277,3 +277,61 @@ pub(super) mod drawn {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hands::Sample;
+    use crate::recording::{DepthFactors, Frame};
+
+    fn recording(clips: &[Clip]) -> Recording {
+        let frame = |i: i32| Frame {
+            timestamp_secs: f64::from(i) * 0.1,
+            world_from_camera: Pose::identity(),
+            files: Default::default(),
+        };
+        Recording {
+            name: String::new(),
+            dir: std::path::PathBuf::new(),
+            camera: drawn::camera(),
+            frames: (0..80).map(frame).collect(),
+            clips: clips.to_vec(),
+            hands: Vec::new(),
+            labels: Default::default(),
+            reconstruction: Vec::new(),
+            depth_factors: DepthFactors::default(),
+        }
+    }
+
+    fn clip(name: &str, start_frame: usize, end_frame: usize) -> Clip {
+        let [narration, verb, noun] = [(); 3].map(|()| String::new());
+        Clip { clip: name.to_owned(), start_frame, end_frame, narration, verb, noun }
+    }
+
+    /// Where a part is looked at that a hand opens from frame 10 to 19 while the narration lasts from 8 to 40.
+    fn looked_at(others: &[Clip]) -> Vec<(usize, Hold)> {
+        let opening = clip("opening", 8, 40);
+        let sample = |i: usize| {
+            let at = Point::new(0.0, 0.03 * i as f64, 0.0);
+            Sample { frame: 10 + i, time_secs: 0.1 * i as f64, observed: at, smoothed: at, accepted: true }
+        };
+        let samples = (0..10).map(sample).collect();
+        let hand = Trajectory { side: None, samples, action: Action::Open, ends_seen: [true; 2] };
+        let clips: Vec<Clip> = std::iter::once(opening.clone()).chain(others.iter().cloned()).collect();
+        open_frames(&recording(&clips), &opening, &hand).iter().map(|f| (f.frame, f.hold)).collect()
+    }
+
+    #[test]
+    fn a_part_stands_after_the_narration_unless_another_clip_moved_something() {
+        let stands = |others: &[Clip]| {
+            looked_at(others).into_iter().filter(|(_, hold)| *hold == Hold::Left).map(|(f, _)| f).collect::<Vec<_>>()
+        };
+        let alone = stands(&[]);
+        assert!(!alone.is_empty() && alone.iter().all(|f| *f > 40), "{alone:?}");
+        assert!(stands(&[clip("closing", 25, 35)]).is_empty());
+        // Before it, or well after it.
+        assert_eq!(stands(&[clip("before", 0, 5), clip("after", 60, 70)]), alone);
+        // What is seen right after the hand let go is looked at in any case.
+        assert!(looked_at(&[clip("closing", 25, 35)]).iter().any(|(f, hold)| *hold == Hold::Free && *f < 25));
+    }
+}
