@@ -300,8 +300,8 @@ block! {
         /// Share of the observed range that the simulated joint must reach.
         pass_range_share: f64 = 0.8, "share", "ours";
         /// A joint must be this much more likely than its best rival, in nats over all clips: 3 is twenty to one; and so sure
-        /// after all evidence. A rival
-        /// that is as much more likely than the joint, and than chance among the rivals gives, refutes it.
+        /// after all evidence. A rival that is as much more likely than the joint, and than chance among the rivals gives,
+        /// refutes it.
         margin_nats: f64 = 3.0, "nats", "ours";
         /// Independent samples in one recorded motion, at most.
         effective_samples: f64 = 8.0, "-", "ours";

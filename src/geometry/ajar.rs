@@ -9,6 +9,7 @@ use crate::articulation::Articulation;
 
 /// Share of all closings that shut the part, and of openings that begin with it shut. Assumed.
 const SHUT: f64 = 0.8;
+
 /// What is known of a clip before its closed end is looked at.
 #[derive(Debug, Clone, Copy)]
 pub struct Known {
@@ -28,13 +29,12 @@ pub fn ajar(face: &Face, rect: &Rect, joint: &Articulation, views: &[View], know
     const STEP_M: f64 = 0.01;
     const MOST_STEPS: usize = 100;
     let leaf = Leaf::of(face, rect, board_m);
-    let shut = Opening { value: 0.0, std: 0.0, informed: false };
     let reach = leaf.points().iter().map(|p| joint.lever(p)).fold(0.0, f64::max);
     let step = (STEP_M / reach.max(openings::LEAST_LEVER_M)).max(known.end / MOST_STEPS as f64);
     let at: Vec<f64> = (1..).map(|k| f64::from(k) * step).take_while(|x| *x < known.end).collect();
     let before: Vec<&View> = views.iter().filter(|view| leaf::shows(&leaf, view)).collect();
     if at.is_empty() || before.is_empty() {
-        return shut;
+        return Opening::SHUT;
     }
     let by_hand = |x: f64| openings::hand_log((known.end - x - known.went) / known.went_std);
     let seen: Vec<Vec<f64>> = before
@@ -61,7 +61,7 @@ pub fn ajar(face: &Face, rect: &Rect, joint: &Articulation, views: &[View], know
         .collect();
     let total: f64 = weights.iter().sum();
     if !total.is_finite() || total <= SHUT {
-        return shut;
+        return Opening::SHUT;
     }
     let mean = at.iter().zip(&weights).map(|(x, w)| x * w / total).sum::<f64>();
     let variance = at.iter().zip(&weights).map(|(x, w)| (x - mean).powi(2) * w / total).sum::<f64>();
@@ -100,7 +100,7 @@ mod tests {
     #[test]
     fn a_door_that_was_shut_stays_shut() {
         for shut in [found(&[0.0, 0.0], 1.2), found(&[0.0], 0.8), found(&[], 0.8), found(&[0.4, 0.2, 0.0], 1.2)] {
-            assert_eq!(shut, Opening { value: 0.0, std: 0.0, informed: false });
+            assert_eq!(shut, Opening::SHUT);
         }
     }
 }

@@ -80,7 +80,8 @@ impl Leaf {
     }
 }
 
-/// Share of the leaf's points that have to be seen; half of a leaf is hidden by what it is opened for, more is no leaf.
+/// Share of the leaf's points that have to be seen: a person hides half of a leaf now and then, and what shows in less of it may
+/// be anything.
 const LEAST_SEEN: f64 = 0.3;
 
 /// Whether a view sees the place of the closed leaf.
@@ -114,7 +115,7 @@ pub(super) fn front_bias_m(face: &Face, rect: &Rect, view: &View) -> f64 {
 }
 
 /// Log odds of a leaf that stands at `x` (rad or m) against one that is shut, from one view's depth; zero where it shows too
-/// little of either place. Of the leaf's points those count that `counts` says, or all; `bias_m` is the view's, as [`front_bias_m`].
+/// little of either place. `bias_m`: the view's, as [`front_bias_m`]. `counts`: which of the leaf's points; all where `None`.
 pub(super) fn odds(
     leaf: &Leaf,
     joint: &Articulation,

@@ -141,17 +141,16 @@ pub fn open_frames(recording: &Recording, clip: &Clip, trajectory: &Trajectory) 
         Action::Close => first.min(clip.start_frame),
     };
     let moves_on = stands.abs_diff(end) > 4 * FREE;
-    let way = end.min(stands)..=end.max(stands);
-    let undisturbed = !recording.clips.iter().any(|c| {
-        c.clip != clip.clip && c.end_frame > c.start_frame && c.start_frame < *way.end() && c.end_frame > *way.start()
-    });
+    let [from, to] = [end.min(stands), end.max(stands)];
+    let meanwhile =
+        |c: &Clip| c.clip != clip.clip && c.end_frame > c.start_frame && c.start_frame < to && c.end_frame > from;
     match trajectory.open_end_seen() {
         true => after(end, Hold::Free),
         false if moves_on => after(end, Hold::Lost),
         false => {}
     }
     // What another clip moved meanwhile may be this part.
-    if undisturbed && (moves_on || !trajectory.open_end_seen()) {
+    if (moves_on || !trajectory.open_end_seen()) && !recording.clips.iter().any(meanwhile) {
         after(stands, Hold::Left);
     }
     frames

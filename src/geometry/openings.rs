@@ -39,6 +39,11 @@ pub struct Opening {
     pub informed: bool,
 }
 
+impl Opening {
+    /// Closed, as nothing is seen to the contrary.
+    pub const SHUT: Self = Self { value: 0.0, std: 0.0, informed: false };
+}
+
 /// What the depth of the open state says.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Refit {
@@ -407,6 +412,24 @@ mod tests {
         let largest = 0.5 * (out + along) + (0.25 * (out - along).powi(2) + mixed * mixed).sqrt();
         assert!(largest < NOISE.hinge_m.powi(2) && out < PLANE_STD_M.powi(2), "{fit:?}");
         assert!((fit.across[0] + Vector::y()).norm() < 1e-9 && fit.across[1].z.abs() < 1e-9, "{fit:?}");
+    }
+
+    #[test]
+    fn a_door_that_stands_is_found_far_from_where_its_hand_was_lost() {
+        let pose = drawn::pose(Point::new(0.5, -1.0, 0.4));
+        let [open, shut] = [1.1, 0.0].map(|x| drawn::sketch(&pose, &door(), x));
+        let grip = drawn::face().center;
+        let stands = |closed: &[View]| {
+            // Further off than an offset of the hand is looked for.
+            let mut view = drawn::view(&open, &pose, door().motion(0.05) * grip);
+            view.hold = Hold::Free;
+            let clips = [OpenState { grip, grip_std_m: 0.03, views: &[view], closed }];
+            refit(&drawn::face(), &drawn::rect(), &door(), &clips, &NOISE).map(|fit| fit.openings[0][0])
+        };
+        let found = stands(&[drawn::view(&shut, &pose, grip)]).unwrap();
+        assert!((found.value - 1.1).abs() < 0.03 && found.informed, "{found:?}");
+        // What was there already while the part was closed is not the part.
+        assert!(stands(&[drawn::view(&open, &pose, grip)]).is_none_or(|o| !o.informed));
     }
 
     #[test]

@@ -55,13 +55,12 @@ pub fn group(clips: &[Held], missed: &[Missed], config: &config::Inference) -> V
         let distance =
             |g: &Vec<usize>| g.iter().map(|&j| (clips[j].closed - clip.closed).norm()).fold(f64::INFINITY, f64::min);
         let same = |g: &usize| groups[*g].iter().any(|&j| same_place(&clips[j], clip, config));
-        let home =
-            groups.iter().position(continues).or_else(|| only_one_open(&groups, clips, missed, i, config)).or_else(
-                || {
-                    let nearest = |a: &usize, b: &usize| distance(&groups[*a]).total_cmp(&distance(&groups[*b]));
-                    (0..groups.len()).filter(same).min_by(nearest)
-                },
-            );
+        let nearest = |a: &usize, b: &usize| distance(&groups[*a]).total_cmp(&distance(&groups[*b]));
+        let home = groups
+            .iter()
+            .position(continues)
+            .or_else(|| only_one_open(&groups, clips, missed, i, config))
+            .or_else(|| (0..groups.len()).filter(same).min_by(nearest));
         match home {
             Some(home) => groups[home].push(i),
             None => groups.push(vec![i]),

@@ -180,7 +180,7 @@ fn closed_end(
 ) -> Opening {
     // Along its front a leaf shows no depth of its own. A hand alone tells the way, not the ends.
     if !end.informed || within_front(joint, &closed.face).is_some() {
-        return Opening { value: 0.0, std: 0.0, informed: false };
+        return Opening::SHUT;
     }
     let lever = joint.lever(&state.grip).max(openings::LEAST_LEVER_M);
     let known = ajar::Known {
