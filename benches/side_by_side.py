@@ -27,6 +27,7 @@ STAGES = [
     ("kalman_rts", ["peer_kalman.py"]),
     ("normals_manhattan", ["peer_normals.py", "--res", "456x256", "--views", "50", "--sample", "20000"]),
     ("lines3d_ransac", ["peer_lines3d.py", "--part", "ransac", "--max-tracks", "30"]),
+    ("score_axes", ["peer_score.py", "--clips", "2000"]),
 ]
 # Written by hand for this very stage, not libraries that people use.
 BY_HAND = {"numba", "numpy", "numpy_dense", "numba+fpsample", "numpy+fpsample"}

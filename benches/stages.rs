@@ -8,9 +8,11 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use paws_twin::articulation::{Action, Articulation, JointKind};
 use paws_twin::config::{self, Config};
-use paws_twin::geometry::{detector, manhattan, segments};
-use paws_twin::hands;
+use paws_twin::geometry::{AxisCandidate, AxisSource, detector, manhattan, segments};
+use paws_twin::hands::{self, Trajectory};
+use paws_twin::inference;
 use paws_twin::localization::{Region, views, voxels};
 use paws_twin::math::{Point, Pose, Vector, kalman};
 use paws_twin::recording::{Camera, DepthFactors, Frame, FrameFiles, Grid, Recording};
@@ -258,9 +260,81 @@ fn lines3d_ransac(c: &mut Criterion) {
     });
 }
 
+/// The paper's rule over clips of 10 to 100 samples with 200 lines each: the line of least variance of the radius for a hinge,
+/// the nearest of the room's directions for a slide.
+fn score_axes(c: &mut Criterion) {
+    let hinge_at = |axis: Vector, origin: Point| AxisCandidate {
+        position_std_m: 0.02,
+        ..AxisCandidate::new(Articulation { kind: JointKind::Revolute, axis, origin }, AxisSource::Line)
+    };
+    let (paths, lines, kinds): (Vec<Vec<Point>>, Vec<Vec<AxisCandidate>>, Vec<i64>) = match (
+        input::<f64>("score_axes", "z"),
+        input::<i64>("score_axes", "off"),
+        input::<f64>("score_axes", "q"),
+        input::<f64>("score_axes", "u"),
+        input::<i64>("score_axes", "kind"),
+    ) {
+        (Some((_, z)), Some((_, off)), Some((shape, q)), Some((_, u)), Some((_, kind))) => {
+            let z = points(&z);
+            let paths = off.windows(2).map(|w| z[w[0] as usize..w[1] as usize].to_vec()).collect();
+            let all: Vec<AxisCandidate> =
+                points(&q).into_iter().zip(points(&u)).map(|(q, u)| hinge_at(u.coords, q)).collect();
+            (paths, all.chunks_exact(shape[1] as usize).map(<[_]>::to_vec).collect(), kind)
+        }
+        _ => {
+            let mut rng = Pcg64Mcg::seed_from_u64(7);
+            let clips = 1_000usize;
+            let paths = (0..clips)
+                .map(|i| {
+                    (0..10 + i % 91)
+                        .map(|k| {
+                            let a = 0.02 * k as f64;
+                            let mut grain = || rng.random_range(-0.01..0.01);
+                            Point::new(0.5 * a.cos() + grain(), 0.5 * a.sin() + grain(), grain())
+                        })
+                        .collect()
+                })
+                .collect();
+            let mut line = |_| {
+                let mut grain = || rng.random_range(-0.4..0.4);
+                hinge_at(Vector::z(), Point::new(grain(), grain(), grain()))
+            };
+            let lines = (0..clips).map(|_| (0..200).map(&mut line).collect()).collect();
+            (paths, lines, (0..clips as i64).map(|i| i64::from(i % 5 < 2)).collect())
+        }
+    };
+    let clips: Vec<(Trajectory, Vec<AxisCandidate>, f64)> = paths
+        .iter()
+        .zip(lines)
+        .zip(&kinds)
+        .map(|((path, mut candidates), kind)| {
+            let sample = |(frame, p): (usize, &Point)| hands::Sample {
+                frame,
+                time_secs: frame as f64 / 30.0,
+                observed: *p,
+                smoothed: *p,
+                accepted: true,
+            };
+            let samples = path.iter().enumerate().map(sample).collect();
+            let trajectory = Trajectory { side: None, samples, action: Action::Open, ends_seen: [true; 2] };
+            candidates.extend([Vector::x(), Vector::y(), Vector::z()].map(|axis| {
+                let joint = Articulation { kind: JointKind::Prismatic, axis, origin: Point::origin() };
+                AxisCandidate::new(joint, AxisSource::Manhattan)
+            }));
+            (trajectory, candidates, if *kind == 0 { 2.0 } else { -2.0 })
+        })
+        .collect();
+    let config = config::Inference::default();
+    stage(c, "score_axes", || {
+        for (trajectory, candidates, words) in &clips {
+            black_box(inference::paper::infer(black_box(trajectory), candidates, *words, None, &config));
+        }
+    });
+}
+
 criterion_group! {
     name = stages;
     config = Criterion::default().sample_size(10).measurement_time(Duration::from_secs(3)).warm_up_time(Duration::from_millis(500));
-    targets = voxel_views, view_select, lsd, kalman_rts, normals_manhattan, lines3d_ransac
+    targets = voxel_views, view_select, lsd, kalman_rts, normals_manhattan, lines3d_ransac, score_axes
 }
 criterion_main!(stages);

@@ -37,6 +37,9 @@ const GATES_M: [f64; 3] = [0.2, 0.1, 0.05];
 const STRIDES: [usize; 3] = [4, 4, 1];
 /// A few coincidences of all samples of two frames are no common surface.
 const LEAST_LINKS: usize = 12;
+/// Change of the factors from one comparison to the next, root mean square, that is none: a tenth of what they can be told to.
+/// Single frames that see little of what others see drift on for long.
+const SETTLED: f64 = 5e-4;
 /// Comparisons a gate at the most; each brings the places that are compared nearer to each other.
 const ROUNDS: usize = 25;
 
@@ -45,6 +48,8 @@ struct Sample {
     /// From the camera centre, depth as read.
     offset: Vector,
     normal: Vector,
+    /// `normal . offset`.
+    along: f64,
 }
 
 struct View<'a> {
@@ -63,7 +68,7 @@ struct Link {
 }
 
 /// Solves the factors that each frame's depth has to be multiplied by: 1 where nothing tells, the common one for frames
-/// that are not among the sketches.
+/// that are not among the sketches. The search starts at the recording's own factors.
 #[must_use]
 pub fn solve(recording: &Recording, sketches: &BTreeMap<usize, Sketch>) -> DepthFactors {
     let views: Vec<View> = sketches
@@ -75,7 +80,7 @@ pub fn solve(recording: &Recording, sketches: &BTreeMap<usize, Sketch>) -> Depth
         return DepthFactors::default();
     }
     let partners: Vec<Vec<usize>> = (0..views.len()).into_par_iter().map(|a| partners(recording, &views, a)).collect();
-    let mut factors = vec![1.0; views.len()];
+    let mut factors: Vec<f64> = views.iter().map(|v| recording.depth_factor(v.sketch.frame)).collect();
     'gates: for (gate_m, stride) in GATES_M.into_iter().zip(STRIDES) {
         for _ in 0..ROUNDS {
             let links: Vec<Vec<Link>> = partners
@@ -86,9 +91,9 @@ pub fn solve(recording: &Recording, sketches: &BTreeMap<usize, Sketch>) -> Depth
                 })
                 .collect();
             let Some(next) = adjust(&links, &factors, gate_m, LEAST_LINKS.div_ceil(stride)) else { break 'gates };
-            let moved = next.iter().zip(&factors).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let moved: f64 = next.iter().zip(&factors).map(|(a, b)| (a - b).powi(2)).sum();
             factors = next;
-            if moved < 5e-4 {
+            if moved < views.len() as f64 * SETTLED * SETTLED {
                 break;
             }
         }
@@ -110,7 +115,8 @@ fn view<'a>(recording: &Recording, sketch: &'a Sketch) -> View<'a> {
             let Some(n) = sketch.normal(&recording.camera, x, y, reach) else { continue };
             // Surfaces seen at a grazing angle have no usable normal.
             if -n.dot(&p.coords.normalize()) > 0.25 {
-                samples.push(Sample { offset: pose.rotation * p.coords, normal: pose.rotation * n });
+                let (offset, normal) = (pose.rotation * p.coords, pose.rotation * n);
+                samples.push(Sample { offset, normal, along: normal.dot(&offset) });
             }
         }
     }
@@ -161,15 +167,18 @@ fn compare(
     stride: usize,
 ) -> Vec<Link> {
     let (from, to) = (&views[a], &views[b]);
-    let pose = &recording.frames[to.sketch.frame].world_from_camera;
     let camera: &Camera = &recording.camera;
-    let inverse = pose.inverse();
+    let world_from_camera =
+        recording.frames[to.sketch.frame].world_from_camera.rotation.to_rotation_matrix().into_inner();
+    let camera_from_world = world_from_camera.transpose();
     let baseline = from.center - to.center;
+    let center = camera_from_world * baseline;
+    let turned = camera_from_world * factors[a];
     from.samples
         .iter()
         .step_by(stride)
         .filter_map(|s| {
-            let local = inverse * (from.center + s.offset * factors[a]);
+            let local = Point::from(center + turned * s.offset);
             let (u, v) = camera.project(&local).filter(|_| local.z > 0.2)?;
             let (x, y) = to.sketch.sample(u, v)?;
             let z = f64::from(to.sketch.depth.data[y * to.sketch.depth.width + x]);
@@ -179,12 +188,15 @@ fn compare(
             // Along the ray of the very pixel: the nearest sample's depth stands for it only on the surface's plane,
             // which is what the gate then checks.
             let (us, vs) = to.sketch.pixel(x, y);
-            let other = pose.rotation * camera.unproject(us, vs, z).coords;
-            let coefficients = [s.normal.dot(&s.offset), s.normal.dot(&other), s.normal.dot(&baseline)];
-            // A side of a board can lie in the plane's slab far from the place that was looked for.
-            let place = (from.center + s.offset * factors[a]) - (to.center + other * factors[b]);
+            let other = world_from_camera * camera.unproject(us, vs, z).coords;
+            let coefficients = [s.along, s.normal.dot(&other), s.normal.dot(&baseline)];
             let link = Link { a, b, coefficients };
-            (link.residual(factors).abs() <= gate_m && place.norm() <= gate_m + 0.05).then_some(link)
+            if link.residual(factors).abs() > gate_m {
+                return None;
+            }
+            // A side of a board can lie in the plane's slab far from the place that was looked for.
+            let place = baseline + s.offset * factors[a] - other * factors[b];
+            (place.norm() <= gate_m + 0.05).then_some(link)
         })
         .collect()
 }

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Matrix3;
+
 use crate::articulation::{Action, Articulation};
 use crate::hands::Trajectory;
 use crate::math::{Point, Pose, Vector};
@@ -11,7 +13,8 @@ use crate::recording::{Camera, Clip, Recording};
 /// A view of the furniture, with the grip's position where the hand holds the part in it.
 #[derive(Debug, Clone, Copy)]
 pub struct View<'a> {
-    camera_from_world: Pose,
+    /// Turn of the camera; what it is turned about is the eye.
+    camera_from_world: Matrix3<f64>,
     /// Where the camera is, world.
     pub(super) eye: Point,
     camera: Camera,
@@ -66,7 +69,7 @@ impl View<'_> {
 
     /// Calls `take` with the direction in the world, per metre of depth, and the depth (metres) of every sample that has one.
     pub(super) fn each_depth(&self, mut take: impl FnMut(Vector, f64)) {
-        let world_from_camera = self.camera_from_world.inverse();
+        let world_from_camera = self.camera_from_world.transpose();
         let grid = &self.sketch.depth;
         for y in 0..grid.height {
             for x in 0..grid.width {
@@ -82,7 +85,7 @@ impl View<'_> {
     /// How far behind the world point `p` the seen surface lies (negative: in front of it), and the depth of `p`.
     /// `None` outside the image, under a hand or where there is no depth.
     pub(super) fn gap(&self, p: &Point) -> Option<(f64, f64)> {
-        let local = self.camera_from_world * p;
+        let local = Point::from(self.camera_from_world * (p - self.eye));
         let (u, v) = self.camera.project(&local).filter(|_| local.z > NEAREST_M)?;
         let (x, y) = self.sketch.sample(u, v)?;
         let z = f64::from(self.sketch.depth.data[y * self.sketch.depth.width + x]) * self.factor;
@@ -156,6 +159,11 @@ pub fn open_frames(recording: &Recording, clip: &Clip, trajectory: &Trajectory) 
     frames
 }
 
+/// From the world's axes to the camera's.
+fn turn(world_from_camera: &Pose) -> Matrix3<f64> {
+    world_from_camera.rotation.inverse().to_rotation_matrix().into_inner()
+}
+
 /// The frames of [`open_frames`] that have a sketch.
 #[must_use]
 pub fn open_views<'a>(
@@ -173,9 +181,9 @@ pub fn views<'a>(recording: &Recording, sketches: &'a BTreeMap<usize, Sketch>, f
     frames
         .iter()
         .filter_map(|&OpenFrame { frame, grip, hold }| {
-            let world_from_camera = recording.frames[frame].world_from_camera;
+            let world_from_camera = &recording.frames[frame].world_from_camera;
             Some(View {
-                camera_from_world: world_from_camera.inverse(),
+                camera_from_world: turn(world_from_camera),
                 eye: Point::from(world_from_camera.translation.vector),
                 camera: recording.camera,
                 sketch: sketches.get(&frame)?,
@@ -266,7 +274,7 @@ pub(super) mod drawn {
 
     pub fn view<'a>(sketch: &'a Sketch, world_from_camera: &Pose, grip: Point) -> View<'a> {
         View {
-            camera_from_world: world_from_camera.inverse(),
+            camera_from_world: turn(world_from_camera),
             eye: Point::from(world_from_camera.translation.vector),
             camera: camera(),
             sketch,

@@ -199,9 +199,10 @@ pub(super) fn seen_share(
     let (mut explained, mut count) = (0usize, 0usize);
     for (view, closed) in sights.views.iter().zip(&sights.closed).filter(|(v, _)| holds.contains(&v.hold)) {
         let motion = joint.motion(joint.opening_at(grip, &view.grip) + offset);
-        let back = motion.inverse();
+        let (turn, way) = (motion.rotation.to_rotation_matrix().into_inner(), motion.translation.vector);
+        let turn_back = turn.transpose();
         for (here, closed) in sights.points.iter().zip(closed) {
-            let moved = motion * here;
+            let moved = Point::from(turn * here.coords + way);
             let travel = (moved - here).norm();
             // Less than twice the least tolerance is no motion anywhere.
             if travel < 2.0 * tolerance(0.0) {
@@ -221,7 +222,7 @@ pub(super) fn seen_share(
                 && travel >= 2.0 * tolerance(z)
                 && gap >= -tolerance(z)
             {
-                let [right, up, out] = face.coordinates(&(back * here));
+                let [right, up, out] = face.coordinates(&Point::from(turn_back * (here.coords - way)));
                 let within = |x: f64, b: [f64; 2]| (b[0]..=b[1]).contains(&x);
                 let covered = out.abs() <= tolerance(z) && within(right, bounds[0]) && within(up, bounds[1]);
                 if !covered {

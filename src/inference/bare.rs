@@ -50,8 +50,8 @@ pub fn infer(trajectory: &BareTrajectory, config: &config::Inference) -> Outcome
     let turn = turn(trajectory);
     let Some(slide) = slide(&points) else { return Outcome::Abstained("the points have no direction".to_owned()) };
     let hinge = hinge(&points, turn.as_ref().filter(|t| t.angle >= MIN_TURN_RAD).map(|t| t.axis));
-    let slide_residual = path::along(&points, &slide.axis, 1.0).map_or(f64::INFINITY, |f| f.variance.sqrt());
-    let hinge_fit = hinge.and_then(|j| path::about_line(&points, &j.line(), |_| 1.0).map(|f| (j, f)));
+    let slide_residual = path::across(&points, &slide.axis).map_or(f64::INFINITY, f64::sqrt);
+    let hinge_fit = hinge.and_then(|j| path::about_line(&points, &j.line()).map(|f| (j, f)));
     let circle_radius_m = hinge_fit.map(|(_, f)| f.radius);
     let hinge_residual = hinge_fit.map(|(_, f)| f.variance().sqrt());
 

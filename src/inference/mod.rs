@@ -85,25 +85,27 @@ pub fn infer(
     let joint = opening_sense(best.joint, face, &trajectory.closed_grip(), std::iter::once(trajectory));
     let (residual, inliers, radius_m) = match kind {
         JointKind::Revolute => {
-            let Some(fit) = path::about_line(&path, &joint.line(), |r| torus_tolerance(r, config)) else {
+            let inliers = path::torus_inliers(&path, &joint.line(), |r| torus_tolerance(r, config));
+            let Some((fit, inliers)) = path::about_line(&path, &joint.line()).zip(inliers) else {
                 return Outcome::Abstained("no hand samples".to_owned());
             };
-            (fit.variance().sqrt(), fit.inliers, Some(fit.radius))
+            (fit.variance().sqrt(), inliers, Some(fit.radius))
         }
         JointKind::Prismatic => {
             // The paper's 2 cm contradicts its own 5 cm of hand noise: twice the noise is what a valid path needs.
             let tolerance = config.prismatic_tolerance_m.max(2.0 * reasoning.hand_std_m);
-            let Some(fit) = path::along(&path, &joint.axis, tolerance) else {
+            let inliers = path::line_inliers(&path, &joint.axis, tolerance);
+            let Some((variance, inliers)) = path::across(&path, &joint.axis).zip(inliers) else {
                 return Outcome::Abstained("no hand samples".to_owned());
             };
-            if fit.inliers < config.prismatic_min_inliers && !vouched_for {
+            if inliers < config.prismatic_min_inliers && !vouched_for {
                 return Outcome::Abstained(format!(
                     "only {:.0} % of the hand samples lie on any slide ({:.0} % are needed)",
-                    100.0 * fit.inliers,
+                    100.0 * inliers,
                     100.0 * config.prismatic_min_inliers
                 ));
             }
-            (fit.variance.sqrt(), fit.inliers, None)
+            (variance.sqrt(), inliers, None)
         }
     };
     let contact_pivot = match kind {

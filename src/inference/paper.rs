@@ -20,20 +20,31 @@ pub fn infer(
     face: Option<&Face>,
     config: &config::Inference,
 ) -> Outcome<ClipJoint> {
+    // Slides need no more than this off their line, metres (§B.1).
+    const TOLERANCE_M: f64 = 0.02;
     let path = trajectory.positions();
-    let hinge = hinge(&path, candidates, config);
-    let slide = slide(&path, candidates);
-    let revolute = match (&hinge, &slide) {
-        _ if words_log_odds != 0.0 => words_log_odds > 0.0,
-        (Some((_, turn)), Some((_, pull))) => turn.radial_variance < pull.variance,
-        (hinge, _) => hinge.is_some(),
+    let revolute = if words_log_odds == 0.0 {
+        match (hinge(&path, candidates, config), slide(&path, candidates)) {
+            (Some((_, turn)), Some((_, pull))) => turn.radial_variance < pull,
+            (hinge, _) => hinge.is_some(),
+        }
+    } else {
+        words_log_odds > 0.0
     };
-    let (candidate, residual_m, inliers, radius_m) = match (revolute, hinge, slide) {
-        (true, Some((c, fit)), _) => (c, fit.radial_variance.sqrt(), fit.inliers, Some(fit.radius)),
-        (true, None, _) => return Outcome::Abstained("no 3D line could be the hinge".to_owned()),
-        (false, _, Some((c, fit))) => (c, fit.variance.sqrt(), fit.inliers, None),
-        (false, _, None) => return Outcome::Abstained("no direction of the room for a slide".to_owned()),
+    let (candidate, residual_m, inliers, radius_m) = if revolute {
+        let Some((c, fit)) = hinge(&path, candidates, config) else {
+            return Outcome::Abstained("no 3D line could be the hinge".to_owned());
+        };
+        let inliers = path::torus_inliers(&path, &c.joint.line(), |r| super::torus_tolerance(r, config));
+        (c, fit.radial_variance.sqrt(), inliers, Some(fit.radius))
+    } else {
+        let Some((c, variance)) = slide(&path, candidates) else {
+            return Outcome::Abstained("no direction of the room for a slide".to_owned());
+        };
+        (c, variance.sqrt(), path::line_inliers(&path, &c.joint.axis, TOLERANCE_M), None)
     };
+    // Whatever has a variance has samples.
+    let inliers = inliers.unwrap_or(0.0);
     let line = candidate.joint.line();
     let contact_pivot = match candidate.joint.kind {
         JointKind::Revolute => centroid(&path).map_or(candidate.joint.origin, |c| line.project(&c)),
@@ -68,22 +79,19 @@ fn hinge<'a>(
     lines()
         .filter(|c| !named || c.named > 0.0)
         .filter_map(|c| {
-            let fit = path::about_line(path, &c.joint.line(), |r| super::torus_tolerance(r, config))?;
+            let fit = path::about_line(path, &c.joint.line())?;
             (fit.radius <= config.max_radius_m).then_some((c, fit))
         })
         .min_by(|a, b| a.1.radial_variance.total_cmp(&b.1.radial_variance))
 }
 
-/// The direction of the room that the hand's path runs along best.
-fn slide<'a>(
-    path: &[crate::math::Point],
-    candidates: &'a [AxisCandidate],
-) -> Option<(&'a AxisCandidate, path::AlongDirection)> {
+/// The direction of the room that the hand's path runs along best, and what variance across it is left, m^2.
+fn slide<'a>(path: &[crate::math::Point], candidates: &'a [AxisCandidate]) -> Option<(&'a AxisCandidate, f64)> {
     let (axes, _) = principal_directions(path)?;
     let along = |c: &AxisCandidate| axes.column(0).dot(&c.joint.axis).abs();
     let best =
         candidates.iter().filter(|c| c.source == AxisSource::Manhattan).max_by(|a, b| along(a).total_cmp(&along(b)))?;
-    Some((best, path::along(path, &best.joint.axis, 0.02)?))
+    Some((best, path::across(path, &best.joint.axis)?))
 }
 
 #[cfg(test)]

@@ -12,8 +12,6 @@ pub struct AboutLine {
     pub radial_variance: f64,
     /// Variance along the line, which a rotation leaves at zero too (m^2).
     pub axial_variance: f64,
-    /// Share of points within `tolerance` of the mean circle (the torus test of §B.1).
-    pub inliers: f64,
 }
 
 impl AboutLine {
@@ -24,39 +22,59 @@ impl AboutLine {
     }
 }
 
-/// Measures a path about a line. `tolerance(radius)` is the torus' half-thickness. `None` for an empty path.
+/// Measures a path about a line. `None` for an empty path.
 #[must_use]
-pub fn about_line(path: &[Point], line: &Line, tolerance: impl Fn(f64) -> f64) -> Option<AboutLine> {
+pub fn about_line(path: &[Point], line: &Line) -> Option<AboutLine> {
+    let at = |p: &Point| {
+        let from = p - line.point;
+        let along = from.dot(&line.direction);
+        ((from.norm_squared() - along * along).max(0.0).sqrt(), along)
+    };
+    // One pass: sums about the first point's values lose no digits where the spread is small.
+    let (first_distance, first_along) = at(path.first()?);
+    let [mut d, mut dd, mut h, mut hh] = [0.0; 4];
+    for p in path {
+        let (distance, along) = at(p);
+        let (distance, along) = (distance - first_distance, along - first_along);
+        d += distance;
+        dd += distance * distance;
+        h += along;
+        hh += along * along;
+    }
+    let share = 1.0 / path.len() as f64;
+    let variance = |sum: f64, squares: f64| (share * squares - (share * sum).powi(2)).max(0.0);
+    Some(AboutLine {
+        radius: first_distance + share * d,
+        radial_variance: variance(d, dd),
+        axial_variance: variance(h, hh),
+    })
+}
+
+/// Share of a path within a torus about a line (§B.1): no further than `tolerance` of the median radius from the circle of the
+/// median radius at the median height. `None` for an empty path.
+#[must_use]
+pub fn torus_inliers(path: &[Point], line: &Line, tolerance: impl Fn(f64) -> f64) -> Option<f64> {
     let d: Vec<f64> = path.iter().map(|p| line.distance(p)).collect();
     let h: Vec<f64> = path.iter().map(|p| line.coordinate(p)).collect();
     let (radius, height) = (stats::median(&d)?, stats::median(&h)?);
     let tolerance = tolerance(radius);
     let inside = d.iter().zip(&h).filter(|(d, h)| (**d - radius).hypot(**h - height) <= tolerance).count();
-    Some(AboutLine {
-        radius: stats::mean(&d)?,
-        radial_variance: stats::variance(&d)?,
-        axial_variance: stats::variance(&h)?,
-        inliers: inside as f64 / path.len() as f64,
-    })
+    Some(inside as f64 / path.len() as f64)
 }
 
-/// A path along a direction.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AlongDirection {
-    /// Mean squared distance from the best line of that direction, m^2.
-    pub variance: f64,
-    /// Share of points within the tolerance of that line.
-    pub inliers: f64,
-}
-
-/// Measures a path along a unit direction. `None` for an empty path.
+/// Mean squared distance of a path from the best line along a unit direction, m^2. `None` for an empty path.
 #[must_use]
-pub fn along(path: &[Point], direction: &Vector, tolerance: f64) -> Option<AlongDirection> {
+pub fn across(path: &[Point], direction: &Vector) -> Option<f64> {
     let mean = centroid(path)?;
-    let distances: Vec<f64> = path.iter().map(|p| reject(&(p - mean), direction).norm()).collect();
-    let variance = distances.iter().map(|d| d * d).sum::<f64>() / path.len() as f64;
-    let inside = distances.iter().filter(|d| **d <= tolerance).count();
-    Some(AlongDirection { variance, inliers: inside as f64 / path.len() as f64 })
+    Some(path.iter().map(|p| reject(&(p - mean), direction).norm_squared()).sum::<f64>() / path.len() as f64)
+}
+
+/// Share of a path within `tolerance` of the best line along a unit direction. `None` for an empty path.
+#[must_use]
+pub fn line_inliers(path: &[Point], direction: &Vector, tolerance: f64) -> Option<f64> {
+    let mean = centroid(path)?;
+    let inside = path.iter().filter(|p| reject(&(*p - mean), direction).norm() <= tolerance).count();
+    Some(inside as f64 / path.len() as f64)
 }
 
 #[cfg(test)]
@@ -72,10 +90,12 @@ mod tests {
             })
             .collect();
         let axis = Line { point: Point::new(0.0, 0.0, 5.0), direction: Vector::z() };
-        let fit = about_line(&arc, &axis, |_| 0.02).unwrap();
-        assert!((fit.radius - 0.5).abs() < 1e-12 && fit.variance() < 1e-20 && fit.inliers == 1.0);
+        let fit = about_line(&arc, &axis).unwrap();
+        assert!((fit.radius - 0.5).abs() < 1e-12 && fit.variance() < 1e-20);
+        assert_eq!(torus_inliers(&arc, &axis, |_| 0.02), Some(1.0));
         let pull: Vec<Point> = (0..20).map(|i| Point::new(0.02 * f64::from(i), 1.0, 0.5)).collect();
-        assert!(along(&pull, &Vector::x(), 0.02).unwrap().variance < 1e-20);
-        assert!(along(&arc, &Vector::x(), 0.02).unwrap().variance > 1e-3);
+        assert!(across(&pull, &Vector::x()).unwrap() < 1e-20 && across(&arc, &Vector::x()).unwrap() > 1e-3);
+        assert_eq!(line_inliers(&pull, &Vector::x(), 0.02), Some(1.0));
+        assert!(line_inliers(&arc, &Vector::x(), 0.02).unwrap() < 0.5);
     }
 }

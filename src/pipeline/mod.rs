@@ -213,7 +213,7 @@ pub fn infer(
         }
         Ok(())
     };
-    let metric = |looks: &Looks| Recording {
+    let metric = |recording: &Recording, looks: &Looks| Recording {
         depth_factors: match config.geometry.depth_scale {
             true => depth_scale::solve(recording, &looks.sketches),
             false => DepthFactors::default(),
@@ -227,7 +227,7 @@ pub fn infer(
     }
     look(&mut looks, still, true)?;
     look(&mut looks, followed.iter().flat_map(|f| f.open.iter().copied()).collect(), false)?;
-    let rectified = metric(&looks);
+    let rectified = metric(recording, &looks);
     let total = recording.clips.len();
     start("localising", total);
     let occupancy = config.localization.occlusion.then(|| views::Occupancy::of(&rectified, &looks.sketches));
@@ -245,7 +245,8 @@ pub fn infer(
     let mut wanted: Vec<usize> = located.iter().flat_map(|l| l.views.iter().copied()).collect();
     sort_unique(&mut wanted);
     look(&mut looks, wanted.clone(), true)?;
-    let rectified = metric(&looks);
+    // What more was looked at meanwhile tells the factors better, from where they are.
+    let rectified = metric(&rectified, &looks);
     start("finding lines", 1);
     for (frame, segments) in &mut looks.segments {
         let factor = rectified.depth_factor(*frame);

@@ -312,8 +312,9 @@ fn judged(group: &Group, reasoner: &dyn Reasoner) -> Option<Judged> {
             let own_grip = trajectory.closed_grip();
             let contexts: Vec<(Face, Option<Rect>, Point)> = [
                 face.map(|f| (f, clips[best].part, grip)),
-                face.map(|f| (f, clips[best].part, own_grip)),
-                own.map(|f| (f, clips[c].part, own_grip)),
+                // Of the best clip all three are one.
+                face.filter(|_| c != best).map(|f| (f, clips[best].part, own_grip)),
+                own.filter(|_| c != best).map(|f| (f, clips[c].part, own_grip)),
             ]
             .into_iter()
             .flatten()

@@ -62,14 +62,13 @@ impl Geometric {
     fn path_log_likelihood(&self, candidate: &AxisCandidate, question: &Question) -> f64 {
         let variance = match candidate.joint.kind {
             JointKind::Prismatic => {
-                let Some(fit) = path::along(question.path, &candidate.joint.axis, self.inference.prismatic_tolerance_m)
-                else {
+                let Some(variance) = path::across(question.path, &candidate.joint.axis) else {
                     return f64::NEG_INFINITY;
                 };
-                fit.variance
+                variance
             }
             JointKind::Revolute => {
-                let Some(fit) = path::about_line(question.path, &candidate.joint.line(), |_| 0.0) else {
+                let Some(fit) = path::about_line(question.path, &candidate.joint.line()) else {
                     return f64::NEG_INFINITY;
                 };
                 if fit.radius > self.inference.max_radius_m || fit.radius < self.inference.min_radius_m {
