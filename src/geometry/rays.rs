@@ -13,7 +13,7 @@ use crate::articulation::{Articulation, JointKind};
 use crate::math::{Point, Vector, rotation};
 
 /// Rays of a view that are looked at, at most.
-const RAYS: usize = 400;
+const RAYS: usize = 200;
 /// Rays that pass the part further away than this meet nothing of it, however it opens, metres beside its own size.
 const REACH_M: f64 = 0.6;
 /// Neighbouring rays and following views share their errors: all rays on a clip's part count as this many.
