@@ -19,6 +19,8 @@ pub struct View<'a> {
     pub(super) eye: Point,
     camera: Camera,
     sketch: &'a Sketch,
+    /// Sample of the sketch, across and down, as factor and offset of a point's direction `x / z`, `y / z`.
+    samples: [[f64; 2]; 2],
     /// What the sketch's depth is multiplied by.
     factor: f64,
     /// Where the hand holds the part, world.
@@ -67,17 +69,19 @@ impl View<'_> {
         crate::math::unit(&(p - self.eye)).is_none_or(|ray| normal.dot(&ray).abs() < GRAZING)
     }
 
-    /// Calls `take` with the direction in the world, per metre of depth, and the depth (metres) of every sample that has one.
+    /// From the camera's axes to the world's.
+    pub(super) fn world_from_camera(&self) -> Matrix3<f64> {
+        self.camera_from_world.transpose()
+    }
+
+    /// Calls `take` with the direction in the camera's axes, per metre of depth, and the depth (metres) of every sample that has
+    /// one.
     pub(super) fn each_depth(&self, mut take: impl FnMut(Vector, f64)) {
-        let world_from_camera = self.camera_from_world.transpose();
         let grid = &self.sketch.depth;
-        for y in 0..grid.height {
-            for x in 0..grid.width {
-                let z = f64::from(grid.data[y * grid.width + x]) * self.factor;
-                if z > 0.0 {
-                    let (u, v) = self.sketch.pixel(x, y);
-                    take(world_from_camera * self.camera.unproject(u, v, 1.0).coords, z);
-                }
+        for (y, row) in grid.data.chunks_exact(grid.width.max(1)).enumerate() {
+            for (x, z) in row.iter().enumerate().filter(|(_, z)| **z > 0.0) {
+                let (u, v) = self.sketch.pixel(x, y);
+                take(self.camera.unproject(u, v, 1.0).coords, f64::from(*z) * self.factor);
             }
         }
     }
@@ -85,10 +89,17 @@ impl View<'_> {
     /// How far behind the world point `p` the seen surface lies (negative: in front of it), and the depth of `p`.
     /// `None` outside the image, under a hand or where there is no depth.
     pub(super) fn gap(&self, p: &Point) -> Option<(f64, f64)> {
-        let local = Point::from(self.camera_from_world * (p - self.eye));
-        let (u, v) = self.camera.project(&local).filter(|_| local.z > NEAREST_M)?;
-        let (x, y) = self.sketch.sample(u, v)?;
-        let z = f64::from(self.sketch.depth.data[y * self.sketch.depth.width + x]) * self.factor;
+        let local = self.camera_from_world * (p - self.eye);
+        if local.z <= NEAREST_M {
+            return None;
+        }
+        let (per_depth, depth) = (1.0 / local.z, &self.sketch.depth);
+        let [x, y] = [0, 1].map(|k| self.samples[k][0] * local[k] * per_depth + self.samples[k][1]);
+        // What is left is positive and rounded down.
+        if x < 0.0 || y < 0.0 || x >= depth.width as f64 || y >= depth.height as f64 {
+            return None;
+        }
+        let z = f64::from(depth.data[y as usize * depth.width + x as usize]) * self.factor;
         (z > 0.0).then_some((z - local.z, local.z))
     }
 }
@@ -159,6 +170,12 @@ pub fn open_frames(recording: &Recording, clip: &Clip, trajectory: &Trajectory) 
     frames
 }
 
+/// See [`View::samples`].
+fn samples(camera: &Camera, sketch: &Sketch) -> [[f64; 2]; 2] {
+    let (first, step) = ((sketch.step / 2) as f64, sketch.step as f64);
+    [[camera.fx, camera.cx], [camera.fy, camera.cy]].map(|[f, c]| [f / step, (c - first) / step + 0.5])
+}
+
 /// From the world's axes to the camera's.
 fn turn(world_from_camera: &Pose) -> Matrix3<f64> {
     world_from_camera.rotation.inverse().to_rotation_matrix().into_inner()
@@ -182,11 +199,13 @@ pub fn views<'a>(recording: &Recording, sketches: &'a BTreeMap<usize, Sketch>, f
         .iter()
         .filter_map(|&OpenFrame { frame, grip, hold }| {
             let world_from_camera = &recording.frames[frame].world_from_camera;
+            let sketch = sketches.get(&frame)?;
             Some(View {
                 camera_from_world: turn(world_from_camera),
                 eye: Point::from(world_from_camera.translation.vector),
                 camera: recording.camera,
-                sketch: sketches.get(&frame)?,
+                sketch,
+                samples: samples(&recording.camera, sketch),
                 factor: recording.depth_factor(frame),
                 grip,
                 hold,
@@ -194,9 +213,6 @@ pub fn views<'a>(recording: &Recording, sketches: &'a BTreeMap<usize, Sketch>, f
         })
         .collect()
 }
-
-/// A share of fewer points is noise.
-pub const MIN_POINTS: usize = 100;
 
 /// Depth noise that a surface at distance `z` may show: half a voxel and 2 % of the distance (metric depth estimates).
 pub(super) fn tolerance(z: f64) -> f64 {
@@ -278,6 +294,7 @@ pub(super) mod drawn {
             eye: Point::from(world_from_camera.translation.vector),
             camera: camera(),
             sketch,
+            samples: samples(&camera(), sketch),
             factor: 1.0,
             grip,
             hold: Hold::Sure,

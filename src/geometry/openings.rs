@@ -72,6 +72,8 @@ const SHARED_STD_M: f64 = 0.01;
 const PLANE_STD_M: f64 = 0.015;
 /// Log odds, nats, beyond the errors of depth and outline that views share: those are worth a few.
 pub(super) const BY_FAR: f64 = 6.0;
+/// Fewer points of the leaf in all views together are noise.
+const LEAST_POINTS: usize = 100;
 /// Degrees of freedom of the hand's error: few, as some hands are lost before a part is closed.
 const TAIL: f64 = 2.0;
 /// Hands hold doors no nearer to their hinge than this, metres.
@@ -158,8 +160,7 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
         fit = Some((solved.inverse(), step.points));
     }
     let (covariance, points) = fit?;
-    // Fewer points are noise.
-    if points < super::moved::MIN_POINTS {
+    if points < LEAST_POINTS {
         return None;
     }
     let rows: [[f64; 2]; 2] = std::array::from_fn(|row| std::array::from_fn(|column| covariance[(row, column)]));

@@ -138,11 +138,12 @@ impl Rays {
             .map(|view| {
                 let eye = face_from_world * (view.eye - face.center);
                 let to = middle - eye;
+                let face_from_camera = face_from_world * view.world_from_camera();
+                let to_in_camera = face_from_camera.transpose() * to;
                 let mut near: Vec<(Vector, f64)> = Vec::new();
                 view.each_depth(|way, depth| {
-                    let way = face_from_world * way;
-                    let along = to.dot(&way) / way.norm_squared();
-                    if along > 0.0 && (way * along - to).norm() < reach {
+                    let along = to_in_camera.dot(&way) / way.norm_squared();
+                    if along > 0.0 && (way * along - to_in_camera).norm_squared() < reach * reach {
                         near.push((way, depth));
                     }
                 });
@@ -151,6 +152,7 @@ impl Rays {
                     .into_iter()
                     .step_by(step)
                     .map(|(way, depth)| {
+                        let way = face_from_camera * way;
                         let front = -eye.z / way.z;
                         let grazing = GRAZING * way.norm();
                         if way.z.abs() < grazing || front < NEAREST_M {

@@ -10,7 +10,7 @@ use std::cmp::Ordering;
 
 use super::Face;
 use super::face::Rect;
-use super::moved::{Hold, MIN_POINTS, View, tolerance};
+use super::moved::{Hold, View, tolerance};
 use super::outline::SMALLEST;
 use super::rays::Rays;
 use crate::articulation::{Articulation, JointKind};
@@ -28,6 +28,13 @@ const STEP_M: f64 = 0.02;
 
 /// Views whose offsets are one when joints are judged: what lets a wrong joint choose freely tells less.
 const TOGETHER: [&[Hold]; 3] = [&[Hold::Sure, Hold::Free], &[Hold::Lost], &[Hold::Left]];
+
+/// Points of a part are a grid of so many to each side.
+const STEPS: usize = 9;
+/// A share of fewer sights is noise: two thirds of the points in one view.
+const LEAST_SIGHTS: usize = 2 * STEPS * STEPS / 3;
+/// So many sights tell all that points can tell, of which neighbouring ones share their fate.
+const ENOUGH_SIGHTS: usize = 2 * LEAST_SIGHTS;
 
 /// Hinges nearer to the hand are no candidates (`inference.min_radius_m`), metres.
 const LEAST_LEVER_M: f64 = 0.05;
@@ -125,7 +132,7 @@ fn by_points(sights: &Sights, joint: &Articulation, grip: &Point, grip_std_m: f6
         // An offset under which nothing moves clearly explains nothing; of equal offsets the first is kept.
         let better = |best: (f64, (f64, usize)), offset: f64| -> (f64, (f64, usize)) {
             let found = at(offset);
-            let order = (found.1 >= MIN_POINTS, found.0).partial_cmp(&(best.1.1 >= MIN_POINTS, best.1.0));
+            let order = (found.1 >= LEAST_SIGHTS, found.0).partial_cmp(&(best.1.1 >= LEAST_SIGHTS, best.1.0));
             if order == Some(Ordering::Greater) { (offset, found) } else { best }
         };
         // Two standard deviations to each side, from the middle outwards: far reaches by double steps first.
@@ -157,7 +164,7 @@ pub(super) fn log_likelihood((share, count): (f64, usize)) -> f64 {
     const WRONG: f64 = 0.3;
     const INDEPENDENT: f64 = 8.0;
     // With few points the share is noise; with none it says nothing.
-    let weight = INDEPENDENT * (count as f64 / 200.0).min(1.0);
+    let weight = INDEPENDENT * (count as f64 / ENOUGH_SIGHTS as f64).min(1.0);
     weight * (share * (RIGHT / WRONG).ln() + (1.0 - share) * ((1.0 - RIGHT) / (1.0 - WRONG)).ln())
 }
 
@@ -177,7 +184,6 @@ impl<'a> Sights<'a> {
     /// A grid over the part, or over a piece of its face around the grip where the part is not known.
     #[must_use]
     pub fn of(face: &'a Face, rect: Option<&Rect>, views: &'a [View<'a>]) -> Self {
-        const STEPS: usize = 12;
         let bounds = rect.unwrap_or(&SMALLEST).bounds;
         let at = |k: usize, b: [f64; 2]| b[0] + (b[1] - b[0]) * (k as f64 + 0.5) / STEPS as f64;
         let points: Vec<Point> =
@@ -203,23 +209,24 @@ pub(super) fn seen_share(
         let turn_back = turn.transpose();
         for (here, closed) in sights.points.iter().zip(closed) {
             let moved = Point::from(turn * here.coords + way);
-            let travel = (moved - here).norm();
+            let travel = (moved - here).norm_squared();
+            let moves = |z: f64| travel >= (2.0 * tolerance(z)).powi(2);
             // Less than twice the least tolerance is no motion anywhere.
-            if travel < 2.0 * tolerance(0.0) {
+            if !moves(0.0) {
                 continue;
             }
             // Where it goes. Within the face there is a surface whether the part slid there or not.
             if let Some((gap, z)) = view.gap(&moved)
-                && travel >= 2.0 * tolerance(z)
+                && moves(z)
                 && gap >= -tolerance(z)
-                && face.coordinates(&moved)[2].abs() > tolerance(z)
+                && (moved - face.center).dot(&face.normal).abs() > tolerance(z)
             {
                 count += 1;
                 explained += usize::from(gap <= tolerance(z));
             }
             // Where it was, unless another piece of it is there now.
             if let Some((gap, z)) = *closed
-                && travel >= 2.0 * tolerance(z)
+                && moves(z)
                 && gap >= -tolerance(z)
             {
                 let [right, up, out] = face.coordinates(&Point::from(turn_back * (here.coords - way)));
@@ -278,13 +285,13 @@ mod tests {
         // Whoever claims the motion that was made explains nearly all.
         for (joint, opening) in [(door(), 0.9), (out, 0.3), (aside, 0.3)] {
             let (own, count) = share(&joint, opening, opening, &joint);
-            assert!(own > 0.9 && count > MIN_POINTS, "{joint:?} {own} {count}");
+            assert!(own > 0.9 && count > LEAST_SIGHTS, "{joint:?} {own} {count}");
         }
         let (as_slide, _) = share(&door(), 0.9, 0.9, &out);
         assert!(as_slide < 0.7, "{as_slide}");
         // A front that stayed shut has the surface of a slide's other end, and uncovered nothing.
         let (still, count) = share(&aside, 0.0, 0.3, &aside);
-        assert!(still < 0.1 && count > MIN_POINTS, "{still} {count}");
+        assert!(still < 0.1 && count > LEAST_SIGHTS, "{still} {count}");
     }
 
     #[test]
