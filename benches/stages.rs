@@ -393,7 +393,7 @@ fn posterior(c: &mut Criterion) {
         });
         inference::infer(trajectory, &candidates, &answer, Some(face), true, &config.reasoning, &config.inference)
     };
-    eprintln!("posterior: {} clips", clips.len());
+    assert_eq!(clips.len(), 8, "the time is read as that of eight clips");
     for (name, with_depth) in [("posterior_hand", false), ("posterior_depth", true)] {
         stage(c, name, || {
             for clip in &clips {
