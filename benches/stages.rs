@@ -3,7 +3,6 @@
 
 #![allow(clippy::unwrap_used, missing_docs, reason = "a bench that cannot run should say so at once")]
 
-use std::collections::BTreeMap;
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -11,18 +10,12 @@ use std::time::Duration;
 use criterion::{Criterion, criterion_group, criterion_main};
 use paws_twin::articulation::{Action, Articulation, JointKind};
 use paws_twin::config::{self, Config};
-use paws_twin::geometry::{AxisCandidate, AxisSource, candidates, detector, manhattan, moved, segments, sights};
+use paws_twin::geometry::{AxisCandidate, AxisSource, detector, manhattan, segments};
 use paws_twin::hands::{self, Trajectory};
 use paws_twin::inference;
 use paws_twin::localization::{Region, views, voxels};
 use paws_twin::math::{Point, Pose, Vector, kalman};
-use paws_twin::pipeline;
-use paws_twin::reasoning::heuristic::Geometric;
-use paws_twin::reasoning::{Question, Reasoner};
-use paws_twin::recording::narration;
-use paws_twin::recording::sketch::Sketch;
 use paws_twin::recording::{Camera, DepthFactors, Frame, FrameFiles, Grid, Recording};
-use paws_twin::synth::{Options, Recorded, Tier};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -270,9 +263,8 @@ fn lines3d_ransac(c: &mut Criterion) {
 /// The paper's rule over clips of 10 to 100 samples with 200 lines each: the line of least variance of the radius for a hinge,
 /// the nearest of the room's directions for a slide.
 fn score_axes(c: &mut Criterion) {
-    let hinge_at = |axis: Vector, origin: Point| AxisCandidate {
-        position_std_m: 0.02,
-        ..AxisCandidate::new(Articulation { kind: JointKind::Revolute, axis, origin }, AxisSource::Line)
+    let hinge_at = |axis: Vector, origin: Point| {
+        AxisCandidate::new(Articulation { kind: JointKind::Revolute, axis, origin }, AxisSource::Line)
     };
     let (paths, lines, kinds): (Vec<Vec<Point>>, Vec<Vec<AxisCandidate>>, Vec<i64>) = match (
         input::<f64>("score_axes", "z"),
@@ -339,73 +331,9 @@ fn score_axes(c: &mut Criterion) {
     });
 }
 
-/// Our inference of the eight clips of a rendered kitchen, by itself: lines, faces, outlines and candidates are known. From the
-/// hand and the names alone, and with the depth of the open states asked about every candidate.
-fn posterior(c: &mut Criterion) {
-    let dir = tempfile::tempdir().unwrap();
-    let recorded = Recorded::new(&Options { seed: 1, tier: Tier::T2, width: 320, parts: 4 }).unwrap();
-    let images = (0..recorded.frames()).flat_map(|frame| recorded.images(frame).unwrap());
-    let tables = recorded.tables().unwrap().into_iter().map(|(name, text)| (name, text.into_bytes()));
-    for (name, bytes) in tables.chain(images) {
-        let path = dir.path().join(name);
-        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-        std::fs::write(path, bytes).unwrap();
-    }
-    let recording = Recording::open(dir.path()).unwrap();
-    let config = Config::default();
-    let reasoner = Geometric { reasoning: config.reasoning.clone(), inference: config.inference.clone() };
-    let scene = pipeline::infer(&recording, &config, &segments::Lsd, &reasoner, &|_, _, _| {}).unwrap();
-    let recording = Recording { depth_factors: scene.depth_factors, ..recording };
-    let clips: Vec<&pipeline::ClipResult> = scene.clips.iter().filter(|c| c.joint.found().is_some()).collect();
-    let mut sketches = BTreeMap::new();
-    for clip in &clips {
-        for open in moved::open_frames(&recording, &clip.clip, clip.trajectory.as_ref().unwrap()) {
-            let depth = recording.depth_as_read(open.frame).unwrap().unwrap();
-            let mask = recording.mask(open.frame).unwrap();
-            sketches.insert(open.frame, Sketch::of(open.frame, &depth, mask.as_ref()));
-        }
-    }
-    let infer = |clip: &pipeline::ClipResult, with_depth: bool| {
-        let trajectory = clip.trajectory.as_ref().unwrap();
-        let (path, face) = (trajectory.positions(), clip.face.as_ref().unwrap());
-        let paths = [path.clone()];
-        let candidates: Vec<AxisCandidate> =
-            clip.candidates.iter().map(|c| candidates::settled(c, &paths, &config.reasoning)).collect();
-        let grip = trajectory.closed_grip();
-        let agreement = if with_depth {
-            let open = moved::open_views(&recording, &sketches, &clip.clip, trajectory);
-            let sights = sights::Sights::of(face, clip.part.as_ref(), &open);
-            let grip_std_m = hands::grip_std_m(trajectory.closed_end_seen());
-            sights::agreements(&sights, candidates.iter().map(|c| &c.joint), &grip, grip_std_m)
-        } else {
-            vec![0.0; candidates.len()]
-        };
-        let answer = reasoner.answer(&Question {
-            reading: &narration::read(&clip.clip),
-            words: None,
-            path: &path,
-            grip,
-            candidates: &candidates,
-            agreement: &agreement,
-            part: None,
-            face: Some(face),
-            up: recording.up(),
-        });
-        inference::infer(trajectory, &candidates, &answer, Some(face), true, &config.reasoning, &config.inference)
-    };
-    assert_eq!(clips.len(), 8, "the time is read as that of eight clips");
-    for (name, with_depth) in [("posterior_hand", false), ("posterior_depth", true)] {
-        stage(c, name, || {
-            for clip in &clips {
-                black_box(infer(black_box(clip), with_depth));
-            }
-        });
-    }
-}
-
 criterion_group! {
     name = stages;
     config = Criterion::default().sample_size(10).measurement_time(Duration::from_secs(3)).warm_up_time(Duration::from_millis(500));
-    targets = voxel_views, view_select, lsd, kalman_rts, normals_manhattan, lines3d_ransac, score_axes, posterior
+    targets = voxel_views, view_select, lsd, kalman_rts, normals_manhattan, lines3d_ransac, score_axes
 }
 criterion_main!(stages);

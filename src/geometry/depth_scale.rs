@@ -315,6 +315,19 @@ mod tests {
     }
 
     #[test]
+    fn where_the_search_starts_does_not_decide_where_it_ends() {
+        let truth: Vec<f64> = (0..10).map(|i| 1.06 * (1.0 + 0.015 * f64::from(i % 3 - 1))).collect();
+        let (mut recording, sketches) = corner(&truth);
+        for start in [0.97, 1.06, 1.15] {
+            recording.depth_factors = DepthFactors { by_frame: BTreeMap::from([(0, 1.0)]), other: start };
+            let found = solve(&recording, &sketches);
+            for (i, factor) in truth.iter().enumerate() {
+                assert!((found.of(i) / factor - 1.0).abs() < 5e-3, "{start}: frame {i}: {} of {factor}", found.of(i));
+            }
+        }
+    }
+
+    #[test]
     fn a_camera_that_stays_in_place_tells_no_scale() {
         let (mut recording, sketches) = corner(&[1.1; 4]);
         let pose = recording.frames[0].world_from_camera;

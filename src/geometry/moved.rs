@@ -13,14 +13,12 @@ use crate::recording::{Camera, Clip, Recording};
 /// A view of the furniture, with the grip's position where the hand holds the part in it.
 #[derive(Debug, Clone, Copy)]
 pub struct View<'a> {
-    /// Turn of the camera; what it is turned about is the eye.
+    /// Rotation from the world's axes to the camera's; the rest of the pose is the eye.
     camera_from_world: Matrix3<f64>,
     /// Where the camera is, world.
     pub(super) eye: Point,
     camera: Camera,
     sketch: &'a Sketch,
-    /// Sample of the sketch, across and down, as factor and offset of a point's direction `x / z`, `y / z`.
-    samples: [[f64; 2]; 2],
     /// What the sketch's depth is multiplied by.
     factor: f64,
     /// Where the hand holds the part, world.
@@ -69,7 +67,7 @@ impl View<'_> {
         crate::math::unit(&(p - self.eye)).is_none_or(|ray| normal.dot(&ray).abs() < GRAZING)
     }
 
-    /// From the camera's axes to the world's.
+    /// Rotation from the camera's axes to the world's.
     pub(super) fn world_from_camera(&self) -> Matrix3<f64> {
         self.camera_from_world.transpose()
     }
@@ -89,17 +87,10 @@ impl View<'_> {
     /// How far behind the world point `p` the seen surface lies (negative: in front of it), and the depth of `p`.
     /// `None` outside the image, under a hand or where there is no depth.
     pub(super) fn gap(&self, p: &Point) -> Option<(f64, f64)> {
-        let local = self.camera_from_world * (p - self.eye);
-        if local.z <= NEAREST_M {
-            return None;
-        }
-        let (per_depth, depth) = (1.0 / local.z, &self.sketch.depth);
-        let [x, y] = [0, 1].map(|k| self.samples[k][0] * local[k] * per_depth + self.samples[k][1]);
-        // What is left is positive and rounded down.
-        if x < 0.0 || y < 0.0 || x >= depth.width as f64 || y >= depth.height as f64 {
-            return None;
-        }
-        let z = f64::from(depth.data[y as usize * depth.width + x as usize]) * self.factor;
+        let local = Point::from(self.camera_from_world * (p - self.eye));
+        let (u, v) = self.camera.project(&local).filter(|_| local.z > NEAREST_M)?;
+        let (x, y) = self.sketch.sample(u, v)?;
+        let z = f64::from(self.sketch.depth.data[y * self.sketch.depth.width + x]) * self.factor;
         (z > 0.0).then_some((z - local.z, local.z))
     }
 }
@@ -170,13 +161,7 @@ pub fn open_frames(recording: &Recording, clip: &Clip, trajectory: &Trajectory) 
     frames
 }
 
-/// See [`View::samples`].
-fn samples(camera: &Camera, sketch: &Sketch) -> [[f64; 2]; 2] {
-    let (first, step) = ((sketch.step / 2) as f64, sketch.step as f64);
-    [[camera.fx, camera.cx], [camera.fy, camera.cy]].map(|[f, c]| [f / step, (c - first) / step + 0.5])
-}
-
-/// From the world's axes to the camera's.
+/// Rotation from the world's axes to the camera's.
 fn turn(world_from_camera: &Pose) -> Matrix3<f64> {
     world_from_camera.rotation.inverse().to_rotation_matrix().into_inner()
 }
@@ -199,13 +184,11 @@ pub fn views<'a>(recording: &Recording, sketches: &'a BTreeMap<usize, Sketch>, f
         .iter()
         .filter_map(|&OpenFrame { frame, grip, hold }| {
             let world_from_camera = &recording.frames[frame].world_from_camera;
-            let sketch = sketches.get(&frame)?;
             Some(View {
                 camera_from_world: turn(world_from_camera),
                 eye: Point::from(world_from_camera.translation.vector),
                 camera: recording.camera,
-                sketch,
-                samples: samples(&recording.camera, sketch),
+                sketch: sketches.get(&frame)?,
                 factor: recording.depth_factor(frame),
                 grip,
                 hold,
@@ -294,7 +277,6 @@ pub(super) mod drawn {
             eye: Point::from(world_from_camera.translation.vector),
             camera: camera(),
             sketch,
-            samples: samples(&camera(), sketch),
             factor: 1.0,
             grip,
             hold: Hold::Sure,

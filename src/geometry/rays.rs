@@ -50,6 +50,36 @@ struct Ray {
     left: f64,
 }
 
+impl Ray {
+    /// Likelihood of its depth if the part moved against that of [`Ray::still`]. `way` and `eye`: its own, moved back with the
+    /// part, so that the leaf is where it was when closed. `drawer`: whether a tray follows the leaf.
+    fn ratio(&self, way: &Vector, eye: &Vector, outline: Option<&Rect>, drawer: bool) -> f64 {
+        let leaf = -eye.z / way.z;
+        let on_leaf = if leaf > NEAREST_M && way.z.abs() > self.grazing {
+            membership(outline, eye.x + way.x * leaf, eye.y + way.y * leaf)
+        } else {
+            0.0
+        };
+        if on_leaf <= 0.0 && self.part <= 0.0 {
+            return 1.0;
+        }
+        let left = match self.part {
+            0.0 => 0.0,
+            part if drawer && leaf > 0.0 && leaf < self.front => part * tray(self.depth, leaf, self.front),
+            part => part * self.left,
+        };
+        let stays = (1.0 - self.part) * self.still;
+        let met = if on_leaf > 0.0 { on_leaf * surface(self.depth, leaf) } else { 0.0 };
+        // Behind the front a leaf is seen through its own hole.
+        let likelihood = if leaf <= self.front + 1e-9 {
+            met + (1.0 - on_leaf) * (left + stays)
+        } else {
+            stays + self.part * met + (1.0 - on_leaf) * left
+        };
+        likelihood / self.still
+    }
+}
+
 /// The rays of one view.
 #[derive(Debug, Clone)]
 struct ViewRays {
@@ -202,37 +232,10 @@ impl Rays {
             };
             // Out of the front within 26 degrees, as fitting tells drawers from sliding doors.
             let drawer = joint.kind == JointKind::Prismatic && axis.z > 0.9 && opening > 0.0;
+            let outline = self.outline.as_ref();
             for some in view.rays.chunks(AT_ONCE) {
-                let ratio: f64 = some
-                    .iter()
-                    .map(|ray| {
-                        let way = back * ray.way;
-                        let leaf = -eye.z / way.z;
-                        let on_leaf = if leaf > NEAREST_M && way.z.abs() > ray.grazing {
-                            membership(self.outline.as_ref(), eye.x + way.x * leaf, eye.y + way.y * leaf)
-                        } else {
-                            0.0
-                        };
-                        if on_leaf <= 0.0 && ray.part <= 0.0 {
-                            return 1.0;
-                        }
-                        let left = match ray.part {
-                            0.0 => 0.0,
-                            part if drawer && leaf > 0.0 && leaf < ray.front => part * tray(ray.depth, leaf, ray.front),
-                            part => part * ray.left,
-                        };
-                        let stays = (1.0 - ray.part) * ray.still;
-                        let met = if on_leaf > 0.0 { on_leaf * surface(ray.depth, leaf) } else { 0.0 };
-                        // Behind the front a leaf is seen through its own hole.
-                        let likelihood = if leaf <= ray.front + 1e-9 {
-                            met + (1.0 - on_leaf) * (left + stays)
-                        } else {
-                            stays + ray.part * met + (1.0 - on_leaf) * left
-                        };
-                        likelihood / ray.still
-                    })
-                    .product();
-                sum += ratio.ln();
+                let ratios = some.iter().map(|ray| ray.ratio(&(back * ray.way), &eye, outline, drawer));
+                sum += ratios.product::<f64>().ln();
             }
         }
         sum * self.weight

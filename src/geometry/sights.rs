@@ -30,11 +30,11 @@ const STEP_M: f64 = 0.02;
 const TOGETHER: [&[Hold]; 3] = [&[Hold::Sure, Hold::Free], &[Hold::Lost], &[Hold::Left]];
 
 /// Points of a part are a grid of so many to each side.
-const STEPS: usize = 9;
-/// A share of fewer sights is noise: two thirds of the points in one view.
-const LEAST_SIGHTS: usize = 2 * STEPS * STEPS / 3;
+const GRID: usize = 9;
+/// A share of fewer sights is noise: of seven tenths of the points in one view.
+const LEAST_SIGHTS: usize = 7 * GRID * GRID / 10;
 /// So many sights tell all that points can tell, of which neighbouring ones share their fate.
-const ENOUGH_SIGHTS: usize = 2 * LEAST_SIGHTS;
+const ENOUGH_SIGHTS: usize = 7 * GRID * GRID / 5;
 
 /// Hinges nearer to the hand are no candidates (`inference.min_radius_m`), metres.
 const LEAST_LEVER_M: f64 = 0.05;
@@ -185,9 +185,9 @@ impl<'a> Sights<'a> {
     #[must_use]
     pub fn of(face: &'a Face, rect: Option<&Rect>, views: &'a [View<'a>]) -> Self {
         let bounds = rect.unwrap_or(&SMALLEST).bounds;
-        let at = |k: usize, b: [f64; 2]| b[0] + (b[1] - b[0]) * (k as f64 + 0.5) / STEPS as f64;
+        let at = |k: usize, b: [f64; 2]| b[0] + (b[1] - b[0]) * (k as f64 + 0.5) / GRID as f64;
         let points: Vec<Point> =
-            (0..STEPS * STEPS).map(|i| face.point(at(i % STEPS, bounds[0]), at(i / STEPS, bounds[1]), 0.0)).collect();
+            (0..GRID * GRID).map(|i| face.point(at(i % GRID, bounds[0]), at(i / GRID, bounds[1]), 0.0)).collect();
         let closed = views.iter().map(|view| points.iter().map(|p| view.gap(p)).collect()).collect();
         Self { rays: Rays::of(face, rect, views), face, bounds, views, points, closed }
     }

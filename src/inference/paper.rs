@@ -20,28 +20,26 @@ pub fn infer(
     face: Option<&Face>,
     config: &config::Inference,
 ) -> Outcome<ClipJoint> {
-    // Slides need no more than this off their line, metres (§B.1).
-    const TOLERANCE_M: f64 = 0.02;
     let path = trajectory.positions();
-    let revolute = if words_log_odds == 0.0 {
-        match (hinge(&path, candidates, config), slide(&path, candidates)) {
-            (Some((_, turn)), Some((_, pull))) => turn.radial_variance < pull,
-            (hinge, _) => hinge.is_some(),
-        }
-    } else {
-        words_log_odds > 0.0
+    // What words rule out is not looked for.
+    let hinge = (words_log_odds >= 0.0).then(|| hinge(&path, candidates, config)).flatten();
+    let slide = (words_log_odds <= 0.0).then(|| slide(&path, candidates)).flatten();
+    let revolute = match (&hinge, &slide) {
+        _ if words_log_odds != 0.0 => words_log_odds > 0.0,
+        (Some((_, turn)), Some((_, pull))) => turn.radial_variance < *pull,
+        (hinge, _) => hinge.is_some(),
     };
-    let (candidate, residual_m, inliers, radius_m) = if revolute {
-        let Some((c, fit)) = hinge(&path, candidates, config) else {
-            return Outcome::Abstained("no 3D line could be the hinge".to_owned());
-        };
-        let inliers = path::torus_inliers(&path, &c.joint.line(), |r| super::torus_tolerance(r, config));
-        (c, fit.radial_variance.sqrt(), inliers, Some(fit.radius))
-    } else {
-        let Some((c, variance)) = slide(&path, candidates) else {
-            return Outcome::Abstained("no direction of the room for a slide".to_owned());
-        };
-        (c, variance.sqrt(), path::line_inliers(&path, &c.joint.axis, TOLERANCE_M), None)
+    let (candidate, residual_m, inliers, radius_m) = match (revolute, hinge, slide) {
+        (true, Some((c, fit)), _) => {
+            let inliers = path::torus_inliers(&path, &c.joint.line(), |r| super::torus_tolerance(r, config));
+            (c, fit.radial_variance.sqrt(), inliers, Some(fit.radius))
+        }
+        (true, None, _) => return Outcome::Abstained("no 3D line could be the hinge".to_owned()),
+        (false, _, Some((c, variance))) => {
+            let inliers = path::line_inliers(&path, &c.joint.axis, config.prismatic_tolerance_m);
+            (c, variance.sqrt(), inliers, None)
+        }
+        (false, _, None) => return Outcome::Abstained("no direction of the room for a slide".to_owned()),
     };
     // Whatever has a variance has samples.
     let inliers = inliers.unwrap_or(0.0);

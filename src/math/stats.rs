@@ -46,13 +46,6 @@ pub fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-/// Population variance; `None` for an empty slice.
-#[must_use]
-pub fn variance(values: &[f64]) -> Option<f64> {
-    let m = mean(values)?;
-    Some(values.iter().map(|v| (v - m).powi(2)).sum::<f64>() / values.len() as f64)
-}
-
 /// Angles made continuous: each one moved by full turns to lie within half a turn of the one before.
 #[must_use]
 pub fn unwrap_angles(angles: &[f64]) -> Vec<f64> {
