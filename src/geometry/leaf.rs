@@ -53,6 +53,11 @@ impl Leaf {
         Self { points, normal: face.normal, board_m }
     }
 
+    /// A front of any points, without a back.
+    pub(super) fn through(points: Vec<Point>, normal: Vector) -> Self {
+        Self { points, normal, board_m: 0.0 }
+    }
+
     /// Out of the closed front.
     pub(super) fn normal(&self) -> Vector {
         self.normal

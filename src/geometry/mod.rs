@@ -5,6 +5,7 @@ pub mod candidates;
 pub mod depth_scale;
 pub mod detector;
 pub mod face;
+pub mod front;
 mod leaf;
 pub mod manhattan;
 pub mod moved;

@@ -5,18 +5,26 @@
 
 use super::Face;
 use super::face::Rect;
+use super::front::Stop;
 use super::moved::{View, tolerance};
 use crate::articulation::Articulation;
 use crate::config;
 use crate::math::Point;
 
+/// Cells of a face, row by row from its lower left.
+#[derive(Debug, Clone)]
+pub(super) struct Grid {
+    pub(super) cell_m: f64,
+    /// Lower left corner in face coordinates, metres.
+    pub(super) origin: [f64; 2],
+    pub(super) columns: usize,
+    pub(super) rows: usize,
+}
+
 /// What the views say about each cell of the face.
 #[derive(Debug, Clone)]
 pub struct CellVotes {
-    cell_m: f64,
-    origin: [f64; 2],
-    columns: usize,
-    rows: usize,
+    grid: Grid,
     /// Surface points on the closed plane.
     closed: Vec<u16>,
     /// Seen on the closed plane while open.
@@ -38,34 +46,12 @@ pub fn vote(
     joint: Option<(&Articulation, &[f64])>,
     config: &config::Fitting,
 ) -> CellVotes {
-    const REACH_M: f64 = 1.2;
-    // The extent comes from the confident region; its rim is a voxel coarse.
-    const MARGIN_M: f64 = 0.1;
-    let low = [0, 1].map(|i| (face.extent[i][0] - MARGIN_M).max(-REACH_M));
-    let high = [0, 1].map(|i| (face.extent[i][1] + MARGIN_M).min(REACH_M));
-    let columns = ((high[0] - low[0]) / config.cell_m).ceil().max(1.0) as usize;
-    let rows = ((high[1] - low[1]) / config.cell_m).ceil().max(1.0) as usize;
-    let mut votes = CellVotes {
-        cell_m: config.cell_m,
-        origin: low,
-        columns,
-        rows,
-        closed: vec![0; columns * rows],
-        still: vec![0; columns * rows],
-        gone: vec![0; columns * rows],
-    };
-    // Metric depth bends and scales by a few per cent: far from the grip a face's points leave its plane by this much.
-    const FACE_M: f64 = 0.06;
-    for p in surface {
-        let [right, up, out] = face.coordinates(p);
-        if let Some(i) = votes.index(right, up)
-            && out.abs() <= FACE_M
-        {
-            votes.closed[i] = votes.closed[i].saturating_add(1);
-        }
-    }
-    for i in 0..columns * rows {
-        let [right, up] = votes.cell(i % columns, i / columns);
+    let grid = Grid::of(face, config);
+    let cells = grid.columns * grid.rows;
+    let mut votes =
+        CellVotes { closed: grid.surface(face, surface), still: vec![0; cells], gone: vec![0; cells], grid };
+    for i in 0..cells {
+        let [right, up] = votes.grid.center(i);
         let here = face.point(right, up, 0.0);
         for (v, view) in open.iter().enumerate() {
             if let Some((gap, z)) = view.gap(&here) {
@@ -93,7 +79,34 @@ pub fn vote(
     votes
 }
 
-impl CellVotes {
+impl Grid {
+    /// Over the face's visible extent, at most 1.2 m from the grip.
+    pub(super) fn of(face: &Face, config: &config::Fitting) -> Self {
+        const REACH_M: f64 = 1.2;
+        // The extent comes from the confident region; its rim is a voxel coarse.
+        const MARGIN_M: f64 = 0.1;
+        let low = [0, 1].map(|i| (face.extent[i][0] - MARGIN_M).max(-REACH_M));
+        let high = [0, 1].map(|i| (face.extent[i][1] + MARGIN_M).min(REACH_M));
+        let [columns, rows] = [0, 1].map(|i| ((high[i] - low[i]) / config.cell_m).ceil().max(1.0) as usize);
+        Self { cell_m: config.cell_m, origin: low, columns, rows }
+    }
+
+    /// Surface points on the closed plane, cell by cell.
+    pub(super) fn surface(&self, face: &Face, points: &[Point]) -> Vec<u16> {
+        // Metric depth bends and scales by a few per cent: far from the grip a face's points leave its plane by this much.
+        const FACE_M: f64 = 0.06;
+        let mut closed = vec![0u16; self.columns * self.rows];
+        for p in points {
+            let [right, up, out] = face.coordinates(p);
+            if let Some(i) = self.index(right, up)
+                && out.abs() <= FACE_M
+            {
+                closed[i] = closed[i].saturating_add(1);
+            }
+        }
+        closed
+    }
+
     /// Cell of face coordinates; `None` outside.
     fn index(&self, right: f64, up: f64) -> Option<usize> {
         let column = ((right - self.origin[0]) / self.cell_m).floor();
@@ -103,23 +116,25 @@ impl CellVotes {
     }
 
     /// Centre of a cell in face coordinates.
-    fn cell(&self, column: usize, row: usize) -> [f64; 2] {
-        [self.origin[0] + (column as f64 + 0.5) * self.cell_m, self.origin[1] + (row as f64 + 0.5) * self.cell_m]
+    pub(super) fn center(&self, cell: usize) -> [f64; 2] {
+        let at = |k: usize, i: usize| self.origin[k] + (i as f64 + 0.5) * self.cell_m;
+        [at(0, cell % self.columns), at(1, cell / self.columns)]
     }
+}
 
+impl CellVotes {
     /// The rectangle of the connected piece of moved cells at the grip; `None` where nothing there is seen to move.
     ///
-    /// Where no open view looked, the part goes on: over its closed face up to an edge (`stops`: lines on the face as
-    /// (0 = upright or 1 = level, offset, from, to) in face coordinates), up to what is seen to stay, or up to the face's end.
+    /// Where no open view looked, the part goes on: over its closed face up to an edge (`stops`: lines on the face), up to what is seen to stay, or up to the face's end.
     #[must_use]
-    pub fn moving_rect(&self, stops: &[(usize, f64, [f64; 2])]) -> Option<Rect> {
+    pub fn moving_rect(&self, stops: &[Stop]) -> Option<Rect> {
         let seen = self.seen_rect()?;
         Some(self.on_lines(self.grown(seen, stops), stops))
     }
 
     /// Moves each side of a rectangle onto the line next to it: fronts end at gaps, which are lines, while cells are coarse and
     /// their votes blurred by the depth's noise. What lies between side and line must not speak against it.
-    fn on_lines(&self, rect: Rect, stops: &[(usize, f64, [f64; 2])]) -> Rect {
+    fn on_lines(&self, rect: Rect, stops: &[Stop]) -> Rect {
         /// How far votes put a side from where it is: a standard deviation.
         const SIDE_STD_M: f64 = 0.03;
         /// What a line must be worth to be believed.
@@ -163,15 +178,15 @@ impl CellVotes {
         const MOST_STILL: usize = 2;
         /// The strip begins at a leaf's end, near which its grip is, metres.
         const NEAR_M: f64 = 0.15;
-        let count = [self.columns, self.rows][axis];
-        let rows = ((across[1] - across[0]) / self.cell_m).round().max(1.0) as usize;
+        let count = [self.grid.columns, self.grid.rows][axis];
+        let rows = ((across[1] - across[0]) / self.grid.cell_m).round().max(1.0) as usize;
         // Of each line of cells across the slide: seen through (1) or there as before (-1).
         let balance = |i: usize| -> f64 {
-            let along = self.origin[axis] + (i as f64 + 0.5) * self.cell_m;
+            let along = self.grid.origin[axis] + (i as f64 + 0.5) * self.grid.cell_m;
             let (mut gone, mut seen) = (0usize, 0usize);
             for k in 0..rows {
-                let other = across[0] + (k as f64 + 0.5) * self.cell_m;
-                let cell = if axis == 0 { self.index(along, other) } else { self.index(other, along) };
+                let other = across[0] + (k as f64 + 0.5) * self.grid.cell_m;
+                let cell = if axis == 0 { self.grid.index(along, other) } else { self.grid.index(other, along) };
                 let Some(cell) = cell.filter(|&c| self.closed[c] > 0 && self.gone[c] != self.still[c]) else {
                     continue;
                 };
@@ -193,7 +208,7 @@ impl CellVotes {
                 if still > MOST_STILL {
                     break;
                 }
-                let [low, high] = [from, to + 1].map(|i| self.origin[axis] + i as f64 * self.cell_m);
+                let [low, high] = [from, to + 1].map(|i| self.grid.origin[axis] + i as f64 * self.grid.cell_m);
                 if sum > best && low < NEAR_M && high > -NEAR_M {
                     (best, strip) = (sum, Some(high - low));
                 }
@@ -205,12 +220,12 @@ impl CellVotes {
     /// Of the cells of a strip that open views saw, the share that was seen to stay (for a strip to be added) or to move (for
     /// one to be taken away).
     fn against(&self, axis: usize, strip: [f64; 2], across: [f64; 2], added: bool) -> f64 {
-        let steps = |b: [f64; 2]| ((b[1] - b[0]) / self.cell_m).floor().max(0.0) as usize;
+        let steps = |b: [f64; 2]| ((b[1] - b[0]) / self.grid.cell_m).floor().max(0.0) as usize;
         let (mut seen, mut against) = (0usize, 0usize);
         for i in 0..steps(strip) {
             for k in 0..steps(across) {
-                let (x, y) = (strip[0] + (i as f64 + 0.5) * self.cell_m, across[0] + (k as f64 + 0.5) * self.cell_m);
-                let Some(cell) = (if axis == 0 { self.index(x, y) } else { self.index(y, x) }) else { continue };
+                let (x, y) = (strip[0] + (i as f64 + 0.5) * self.grid.cell_m, across[0] + (k as f64 + 0.5) * self.grid.cell_m);
+                let Some(cell) = (if axis == 0 { self.grid.index(x, y) } else { self.grid.index(y, x) }) else { continue };
                 let (still, gone) = (self.still[cell], self.gone[cell]);
                 seen += usize::from(still != gone);
                 against += usize::from(if added { still > gone } else { gone > still });
@@ -220,19 +235,19 @@ impl CellVotes {
     }
 
     /// Extends a rectangle side by side over cells that no open view saw.
-    fn grown(&self, rect: Rect, stops: &[(usize, f64, [f64; 2])]) -> Rect {
+    fn grown(&self, rect: Rect, stops: &[Stop]) -> Rect {
         let mut bounds = rect.bounds;
         for axis in [0, 1] {
             let across = bounds[1 - axis];
-            let count = ((across[1] - across[0]) / self.cell_m).round().max(1.0) as usize;
+            let count = ((across[1] - across[0]) / self.grid.cell_m).round().max(1.0) as usize;
             for (side, sign) in [(0, -1.0), (1, 1.0)] {
                 loop {
                     let edge = bounds[axis][side];
-                    let next = edge + sign * 0.5 * self.cell_m;
+                    let next = edge + sign * 0.5 * self.grid.cell_m;
                     let cells: Vec<usize> = (0..count)
                         .filter_map(|k| {
-                            let along = across[0] + (k as f64 + 0.5) * self.cell_m;
-                            if axis == 0 { self.index(next, along) } else { self.index(along, next) }
+                            let along = across[0] + (k as f64 + 0.5) * self.grid.cell_m;
+                            if axis == 0 { self.grid.index(next, along) } else { self.grid.index(along, next) }
                         })
                         .collect();
                     // Half of the edge's length must be face, and less than half of it seen to stay (beside a hinge a
@@ -241,12 +256,12 @@ impl CellVotes {
                     let known = cells.iter().filter(|&&i| self.still[i] > 0).count();
                     let stopped = stops.iter().any(|(a, offset, span)| {
                         let covers = span[1].min(across[1]) - span[0].max(across[0]);
-                        *a == axis && (offset - edge).abs() <= self.cell_m && covers > 0.4 * (across[1] - across[0])
+                        *a == axis && (offset - edge).abs() <= self.grid.cell_m && covers > 0.4 * (across[1] - across[0])
                     });
                     if stopped || 2 * face < count || 2 * known > count {
                         break;
                     }
-                    bounds[axis][side] += sign * self.cell_m;
+                    bounds[axis][side] += sign * self.grid.cell_m;
                 }
             }
         }
@@ -259,29 +274,29 @@ impl CellVotes {
         let moving: Vec<bool> =
             (0..self.closed.len()).map(|i| self.gone[i] > self.still[i] && self.closed[i] > 0).collect();
         let piece = self.piece_at_grip(&moving)?;
-        if piece.len() as f64 * self.cell_m * self.cell_m < MIN_AREA_M2 {
+        if piece.len() as f64 * self.grid.cell_m * self.grid.cell_m < MIN_AREA_M2 {
             return None;
         }
-        let (mut by_column, mut by_row) = (vec![0usize; self.columns], vec![0usize; self.rows]);
+        let (mut by_column, mut by_row) = (vec![0usize; self.grid.columns], vec![0usize; self.grid.rows]);
         for &i in &piece {
-            by_column[i % self.columns] += 1;
-            by_row[i / self.columns] += 1;
+            by_column[i % self.grid.columns] += 1;
+            by_row[i / self.grid.columns] += 1;
         }
         // A rectangle's rows are equally full: rows with under a third of the fullest are fringe.
         let span = |counts: &[usize], origin: f64| -> Option<[f64; 2]> {
             let limit = counts.iter().max()? / 3;
             let first = counts.iter().position(|&c| c > limit)?;
             let last = counts.iter().rposition(|&c| c > limit)?;
-            Some([origin + first as f64 * self.cell_m, origin + (last + 1) as f64 * self.cell_m])
+            Some([origin + first as f64 * self.grid.cell_m, origin + (last + 1) as f64 * self.grid.cell_m])
         };
-        Some(Rect { bounds: [span(&by_column, self.origin[0])?, span(&by_row, self.origin[1])?] })
+        Some(Rect { bounds: [span(&by_column, self.grid.origin[0])?, span(&by_row, self.grid.origin[1])?] })
     }
 
     /// The 4-connected piece of marked cells nearest to the grip (the face's origin), if within 25 cm of it.
     fn piece_at_grip(&self, marked: &[bool]) -> Option<Vec<usize>> {
         const NEAR_M: f64 = 0.25;
         let distance = |i: usize| {
-            let [r, u] = self.cell(i % self.columns, i / self.columns);
+            let [r, u] = self.grid.center(i);
             r.hypot(u)
         };
         let mut taken = vec![false; marked.len()];
@@ -295,12 +310,12 @@ impl CellVotes {
             let mut next = 0;
             while let Some(&i) = piece.get(next) {
                 next += 1;
-                let (c, r) = (i % self.columns, i / self.columns);
+                let (c, r) = (i % self.grid.columns, i / self.grid.columns);
                 let neighbours = [
                     (c > 0).then(|| i - 1),
-                    (c + 1 < self.columns).then(|| i + 1),
-                    (r > 0).then(|| i - self.columns),
-                    (r + 1 < self.rows).then(|| i + self.columns),
+                    (c + 1 < self.grid.columns).then(|| i + 1),
+                    (r > 0).then(|| i - self.grid.columns),
+                    (r + 1 < self.grid.rows).then(|| i + self.grid.columns),
                 ];
                 for n in neighbours.into_iter().flatten() {
                     if marked[n] && !taken[n] {
@@ -326,10 +341,7 @@ mod tests {
     fn votes(columns: usize, rows: usize) -> CellVotes {
         let cells = columns * rows;
         CellVotes {
-            cell_m: 0.02,
-            origin: [-0.4, -0.3],
-            columns,
-            rows,
+            grid: Grid { cell_m: 0.02, origin: [-0.4, -0.3], columns, rows },
             closed: vec![1; cells],
             still: vec![0; cells],
             gone: vec![0; cells],

@@ -7,6 +7,7 @@ use crate::articulation::Outcome;
 use crate::config::{Config, InferenceMethod, LineMethod};
 use crate::error::Result;
 use crate::geometry::Rect;
+use crate::geometry::front::Stop;
 use crate::geometry::segments::LiftedSegment;
 use crate::geometry::{Face, LineTrack, ManhattanFrame, candidates, face, moved, outline, sights, tracks};
 use crate::hands::{self, Trajectory};
@@ -224,8 +225,8 @@ pub(super) fn surface(
     points
 }
 
-/// Lines on a face that run along one of its axes, as [`outline::CellVotes::moving_rect`] takes them.
-pub(super) fn edges_on(face: &Face, lines: &[LineTrack]) -> Vec<(usize, f64, [f64; 2])> {
+/// Lines on a face that run along one of its axes.
+pub(super) fn edges_on(face: &Face, lines: &[LineTrack]) -> Vec<Stop> {
     lines
         .iter()
         .filter_map(|line| {

@@ -11,7 +11,7 @@ use crate::articulation::{Articulation, JointKind};
 use crate::config::{Config, InferenceMethod};
 use crate::geometry::Rect;
 use crate::geometry::sights::{self, Sights};
-use crate::geometry::{AxisCandidate, Face, candidates, moved, outline};
+use crate::geometry::{AxisCandidate, Face, candidates, front, moved, outline};
 use crate::hands::{self, Trajectory};
 use crate::inference::{self, aggregate, uncertainty};
 use crate::math::Point;
@@ -372,8 +372,8 @@ fn judged(group: &Group, reasoner: &dyn Reasoner) -> Option<Judged> {
 struct Around {
     /// Points of the furniture, world.
     surface: Vec<Point>,
-    /// As [`outline::CellVotes::moving_rect`] takes them.
-    stops: Vec<(usize, f64, [f64; 2])>,
+    /// Lines on its face.
+    stops: Vec<front::Stop>,
 }
 
 /// Of the clip that saw the closed part best.
@@ -420,10 +420,16 @@ fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around) -> Hy
         widest = fit.widest;
         depth = Some(fit.depth);
         // With the openings known better the part's outline is, too.
-        let seen = Some((&joint, fit.openings.as_slice()));
-        part = outline::vote(&face, &around.surface, &fit.views, seen, &config.fitting)
-            .moving_rect(&around.stops)
-            .or(part);
+        let seen = front::Seen {
+            face: &face,
+            rect: &rect,
+            surface: &around.surface,
+            views: &fit.views,
+            joint: &joint,
+            openings: &fit.openings,
+            stops: &around.stops,
+        };
+        part = front::fit(&seen, &config.fitting).or(part);
     }
     let evidence = uncertainty::Evidence {
         joint: &joint,

@@ -1,0 +1,337 @@
+//! The outline of a part whose joint and openings are known: of all rectangles on its face the one that explains best what is
+//! seen of it closed and open (ours).
+//!
+//! Before the joint is known [`super::outline`] says roughly what moved. With it, every cell of the face is asked the same
+//! in every view: is there a surface where the joint would have taken it, and is its closed place seen through? A cell beside
+//! the hinge has no answer, so a door goes on to its hinge; what an open drawer hides has none either. Gaps between fronts are
+//! lines, the grip is on the part, and parts are as large as fronts are.
+
+use super::Face;
+use super::face::Rect;
+use super::leaf::{self, Leaf};
+use super::moved::{View, tolerance};
+use super::outline::Grid;
+use crate::articulation::{Articulation, JointKind};
+use crate::config;
+use crate::math::{Point, Pose};
+
+/// A line on a face along one of its axes: (0 = upright or 1 = level, offset, from, to) in face coordinates, metres.
+pub type Stop = (usize, f64, [f64; 2]);
+
+/// A part as it was seen.
+#[derive(Debug, Clone, Copy)]
+pub struct Seen<'a> {
+    /// Of the part.
+    pub face: &'a Face,
+    /// What is known of the outline so far.
+    pub rect: &'a Rect,
+    /// Points of the furniture, world.
+    pub surface: &'a [Point],
+    /// Of the open state.
+    pub views: &'a [View<'a>],
+    /// Of the part.
+    pub joint: &'a Articulation,
+    /// In each view, rad or m.
+    pub openings: &'a [f64],
+    /// Lines on the face.
+    pub stops: &'a [Stop],
+}
+
+/// Fronts narrower than this are none, metres.
+const LEAST_M: f64 = 0.08;
+/// A front of 15 x 15 cm is the smallest drawer, square metres.
+const LEAST_MOVED_M2: f64 = 0.02;
+/// Errors of depth share their fate over so much, metres: a spot of that size that moved in all views is worth a nat.
+const SPOT_M: f64 = 0.07;
+/// Where no surface was seen there is hardly a front: a share of what a cell that stayed counts.
+const BARE: f64 = 0.3;
+/// Of a grip across its motion, once its face has its origin there, metres.
+const GRIP_STD_M: f64 = 0.08;
+/// A side all along a line against one beside it, nats.
+const ON_LINE: f64 = 3.0;
+/// Width and height of fronts, log-normal: metres, and the standard deviation of their logarithms.
+const MEDIAN_M: f64 = 0.42;
+const SPREAD: f64 = 0.6;
+/// Of a hinge that was fitted to the depth of the open states, metres.
+const HINGE_STD_M: f64 = 0.03;
+/// A hinge that is wrong costs no more than this, nats.
+const MOST_HINGE: f64 = 4.5;
+
+/// The part's outline. `None` where next to nothing of it is seen to move.
+#[must_use]
+pub fn fit(seen: &Seen, config: &config::Fitting) -> Option<Rect> {
+    let evidence = Evidence::of(seen, config);
+    let marks = [0, 1].map(|axis| Marks::of(axis, &evidence.grid, seen.stops));
+    let hinge = hinge_side(seen.face, seen.joint);
+    let rect_at = |at: &[[usize; 2]; 2]| Rect { bounds: [0, 1].map(|k| at[k].map(|i| marks[k].offsets[i])) };
+    let worth = |at: &[[usize; 2]; 2]| {
+        let rect = rect_at(at);
+        let lines = [0, 1].map(|k| at[k].map(|i| marks[k].covered(i, rect.bounds[1 - k])).iter().sum::<f64>());
+        evidence.nats(&rect) + prior(&rect, hinge) + ON_LINE * lines.iter().sum::<f64>()
+    };
+    let start = |bounds: [[f64; 2]; 2]| climbed([0, 1].map(|k| bounds[k].map(|x| marks[k].nearest(x))), &marks, worth);
+    // From what is known, from the grip alone, and from all that can be seen.
+    let grid = &evidence.grid;
+    let all = [[0, grid.columns], [0, grid.rows]];
+    let all = [0, 1].map(|k| all[k].map(|i| grid.origin[k] + i as f64 * grid.cell_m));
+    let starts = [seen.rect.bounds, super::outline::SMALLEST.bounds, all];
+    let (_, at) = starts.into_iter().map(start).reduce(|best, next| if next.0 > best.0 { next } else { best })?;
+    let rect = rect_at(&at);
+    (evidence.moved_m2(&rect) >= LEAST_MOVED_M2).then_some(rect)
+}
+
+/// The best rectangle that is reached by choosing both sides along one axis, then along the other, until neither changes.
+fn climbed(
+    start: [[usize; 2]; 2],
+    marks: &[Marks; 2],
+    worth: impl Fn(&[[usize; 2]; 2]) -> f64,
+) -> (f64, [[usize; 2]; 2]) {
+    /// Rises end after two or three.
+    const ROUNDS: usize = 6;
+    let (mut at, mut best) = (start, worth(&start));
+    for _ in 0..ROUNDS {
+        let before = at;
+        for k in [0, 1] {
+            let count = marks[k].offsets.len();
+            for (low, high) in (0..count).flat_map(|low| (low + 1..count).map(move |high| (low, high))) {
+                let mut next = at;
+                next[k] = [low, high];
+                let value = worth(&next);
+                if value > best {
+                    (best, at) = (value, next);
+                }
+            }
+        }
+        if at == before {
+            break;
+        }
+    }
+    (best, at)
+}
+
+/// What is known of a part's outline before it is seen to move, nats.
+fn prior(rect: &Rect, hinge: Option<(usize, f64)>) -> f64 {
+    let size = rect.size();
+    if size.iter().any(|s| *s < LEAST_M) {
+        return f64::NEG_INFINITY;
+    }
+    let usual = size.map(|s| ((s / MEDIAN_M).ln() / SPREAD).powi(2));
+    let off = rect.bounds.map(|b| (b[0].max(-b[1]).max(0.0) / GRIP_STD_M).powi(2));
+    let hung = hinge.map_or(0.0, |(axis, offset)| {
+        let side = rect.bounds[axis][usize::from(offset > 0.0)];
+        let x = 0.5 * ((side - offset) / HINGE_STD_M).powi(2);
+        x * MOST_HINGE / (x + MOST_HINGE)
+    });
+    -0.5 * usual.iter().chain(&off).sum::<f64>() - hung
+}
+
+/// Where a hinge bounds its part: (0 = upright or 1 = level, offset) in face coordinates.
+fn hinge_side(face: &Face, joint: &Articulation) -> Option<(usize, f64)> {
+    const ALONG: f64 = 0.9;
+    let at = face.coordinates(&joint.origin);
+    let along = [face.up, face.right].map(|a| joint.axis.dot(&a).abs());
+    let axis = (0..2).find(|&k| along[k] > ALONG)?;
+    (joint.kind == JointKind::Revolute).then_some((axis, at[axis]))
+}
+
+/// Where sides can be along an axis: between cells, and on lines.
+struct Marks {
+    offsets: Vec<f64>,
+    /// Of the lines at each.
+    spans: Vec<Vec<[f64; 2]>>,
+}
+
+impl Marks {
+    fn of(axis: usize, grid: &Grid, stops: &[Stop]) -> Self {
+        /// Nearer lines are one.
+        const ONE_M: f64 = 1e-3;
+        let count = [grid.columns, grid.rows][axis];
+        let [low, high] = [0, count].map(|i| grid.origin[axis] + i as f64 * grid.cell_m);
+        let lines = || stops.iter().filter(|(a, offset, _)| *a == axis && (low..=high).contains(offset));
+        let mut offsets: Vec<f64> = (0..=count).map(|i| low + i as f64 * grid.cell_m).collect();
+        offsets.extend(lines().map(|(_, offset, _)| *offset));
+        offsets.sort_by(f64::total_cmp);
+        offsets.dedup_by(|a, b| (*a - *b).abs() < ONE_M);
+        let spans = offsets
+            .iter()
+            .map(|x| lines().filter(|(_, offset, _)| (offset - x).abs() < ONE_M).map(|(.., span)| *span).collect())
+            .collect();
+        Self { offsets, spans }
+    }
+
+    fn nearest(&self, x: f64) -> usize {
+        let off = |i: usize| (self.offsets[i] - x).abs();
+        (0..self.offsets.len()).min_by(|&a, &b| off(a).total_cmp(&off(b))).unwrap_or(0)
+    }
+
+    /// Share of a side at a mark that lies on a line.
+    fn covered(&self, mark: usize, across: [f64; 2]) -> f64 {
+        let share = |span: &[f64; 2]| (span[1].min(across[1]) - span[0].max(across[0])) / (across[1] - across[0]);
+        self.spans[mark].iter().map(share).fold(0.0, f64::max)
+    }
+}
+
+/// What the views say of each cell, summed over all cells to the lower left of each corner of cells.
+struct Evidence {
+    grid: Grid,
+    /// From -1, stayed, to 1, moved; less [`BARE`] where there is no surface.
+    weights: Vec<f64>,
+    /// Cells that moved.
+    moved: Vec<f64>,
+}
+
+impl Evidence {
+    fn of(seen: &Seen, config: &config::Fitting) -> Self {
+        let Seen { face, rect, surface, views, joint, openings, .. } = *seen;
+        let grid = Grid::of(face, config);
+        let cells = (0..grid.columns * grid.rows).map(|i| {
+            let [right, up] = grid.center(i);
+            face.point(right, up, 0.0)
+        });
+        let front = Leaf::through(cells.collect(), face.normal);
+        let shut = Pose::identity();
+        let mut told = vec![(0.0, 0.0); front.points().len()];
+        for (view, opening) in views.iter().zip(openings) {
+            let bias_m = leaf::front_bias_m(face, rect, view);
+            let motion = joint.motion(*opening);
+            for (here, (sum, count)) in front.points().iter().zip(&mut told) {
+                let at = |motion: &Pose| {
+                    let seen = front.behind(here, motion, view)?;
+                    Some(there(bias_m - seen.along_normal, seen.depth))
+                };
+                if let Some((open, closed)) = at(&motion).zip(at(&shut)) {
+                    *sum += 0.5 * (open - closed);
+                    *count += 1.0;
+                }
+            }
+        }
+        let closed = grid.surface(face, surface);
+        let bare = |i: usize| {
+            let (c, r) = (i % grid.columns, i / grid.columns);
+            let mut near = (r.saturating_sub(1)..(r + 2).min(grid.rows))
+                .flat_map(|r| (c.saturating_sub(1)..(c + 2).min(grid.columns)).map(move |c| (r, c)));
+            near.all(|(r, c)| closed[r * grid.columns + c] == 0)
+        };
+        // One view is worth half of many: they share the depth's errors.
+        let weights: Vec<f64> = told
+            .iter()
+            .enumerate()
+            .map(|(i, (sum, count))| if bare(i) { -BARE } else { sum / (count + 1.0) })
+            .collect();
+        let moved = weights.iter().map(|w| f64::from(u8::from(*w > 0.0)));
+        let moved = summed(&grid, &moved.collect::<Vec<f64>>());
+        Self { weights: summed(&grid, &weights), moved, grid }
+    }
+
+    /// How much better a rectangle explains what is seen than that nothing moved.
+    fn nats(&self, rect: &Rect) -> f64 {
+        self.over(&self.weights, rect) * (self.grid.cell_m / SPOT_M).powi(2)
+    }
+
+    fn moved_m2(&self, rect: &Rect) -> f64 {
+        self.over(&self.moved, rect) * self.grid.cell_m.powi(2)
+    }
+
+    fn over(&self, sums: &[f64], rect: &Rect) -> f64 {
+        let corner = |k: usize, x: f64| {
+            let cells = ((x - self.grid.origin[k]) / self.grid.cell_m).round().max(0.0) as usize;
+            cells.min([self.grid.columns, self.grid.rows][k])
+        };
+        let [c, r] = [0, 1].map(|k| rect.bounds[k].map(|x| corner(k, x)));
+        let at = |r: usize, c: usize| sums[r * (self.grid.columns + 1) + c];
+        at(r[1], c[1]) + at(r[0], c[0]) - at(r[0], c[1]) - at(r[1], c[0])
+    }
+}
+
+/// Whether a surface that lies `behind` a place (metres, along its normal) is that place's: from 1, it is, to -1, the place is
+/// seen through. What hides a place says nothing, zero.
+fn there(behind: f64, depth: f64) -> f64 {
+    /// Of the depth's tolerance.
+    const HALF: f64 = 0.6;
+    let x = (behind / (HALF * tolerance(depth))).powi(2);
+    let miss = x / (x + 1.0);
+    if behind > 0.0 { 1.0 - 2.0 * miss } else { 1.0 - miss }
+}
+
+/// For each corner of cells the sum of all cells to its lower left.
+fn summed(grid: &Grid, of: &[f64]) -> Vec<f64> {
+    let width = grid.columns + 1;
+    let mut sums = vec![0.0; width * (grid.rows + 1)];
+    for (i, value) in of.iter().enumerate() {
+        let corner = (i / grid.columns + 1) * width + i % grid.columns + 1;
+        sums[corner] = value + sums[corner - 1] + sums[corner - width] - sums[corner - width - 1];
+    }
+    sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::moved::drawn;
+    use super::*;
+    use crate::math::Vector;
+
+    /// What is found of the drawn leaf after it moved by `opening`, of which `told` is known, and its true outline.
+    fn found(joint: &Articulation, opening: f64, told: f64, stops: &[Stop]) -> (Option<Rect>, Rect) {
+        let face = drawn::face();
+        let poses = [drawn::pose(Point::new(0.3, -1.0, 0.5)), drawn::pose(Point::new(-0.2, -1.1, 0.4))];
+        let sketches = poses.map(|pose| drawn::sketch(&pose, joint, opening));
+        let views: Vec<View> = sketches.iter().zip(&poses).map(|(s, pose)| drawn::view(s, pose, face.center)).collect();
+        let [right, up] = [0, 1].map(|k| face.extent[k]);
+        let surface: Vec<Point> = (0..200 * 200)
+            .map(|i| {
+                let at = |b: [f64; 2], k: usize| b[0] + (b[1] - b[0]) * k as f64 / 199.0;
+                face.point(at(right, i % 200), at(up, i / 200), 0.0)
+            })
+            .collect();
+        // What is known before is wrong on all sides.
+        let wider = Rect { bounds: drawn::rect().bounds.map(|b| [b[0] - 0.1, b[1] + 0.1]) };
+        let seen = Seen {
+            face: &face,
+            rect: &wider,
+            surface: &surface,
+            views: &views,
+            joint,
+            openings: &[told; 2],
+            stops,
+        };
+        (fit(&seen, &config::Fitting::default()), drawn::rect())
+    }
+
+    fn worst(found: &Rect, truth: &Rect) -> f64 {
+        let sides = found.bounds.iter().flatten().zip(truth.bounds.iter().flatten());
+        sides.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+
+    fn door() -> Articulation {
+        let origin = Point::new(-0.25, 0.0, 0.0);
+        Articulation { kind: JointKind::Revolute, axis: -Vector::z(), origin }
+    }
+
+    #[test]
+    fn a_door_goes_on_to_its_hinge_and_a_drawer_ends_where_it_hides_what_is_below() {
+        // A door that is hardly open does not move beside its hinge, where its side is the hinge itself.
+        for (joint, opening) in [
+            (door(), 0.25),
+            (door(), 1.0),
+            (Articulation { kind: JointKind::Prismatic, axis: -Vector::y(), origin: Point::origin() }, 0.25),
+        ] {
+            let (rect, truth) = found(&joint, opening, opening, &[]);
+            assert!(worst(&rect.unwrap(), &truth) < 0.05, "{joint:?} {rect:?} {truth:?}");
+        }
+    }
+
+    #[test]
+    fn sides_lie_on_lines_next_to_them_and_not_on_others() {
+        let truth = drawn::rect();
+        let [[left, right], [bottom, top]] = truth.bounds;
+        let line = |offset: f64| (0, offset, [bottom, top]);
+        let (rect, _) = found(&door(), 0.8, 0.8, &[line(right), line(0.3 * left + 0.7 * right)]);
+        assert!((rect.unwrap().bounds[0][1] - right).abs() < 1e-3, "{rect:?}");
+    }
+
+    #[test]
+    fn what_did_not_move_has_no_outline() {
+        let (rect, _) = found(&door(), 0.0, 0.8, &[]);
+        assert!(rect.is_none(), "{rect:?}");
+    }
+}
