@@ -60,6 +60,12 @@ const MOST_HINGE: f64 = 4.5;
 /// The part's outline. `None` where next to nothing of it is seen to move.
 #[must_use]
 pub fn fit(seen: &Seen, config: &config::Fitting) -> Option<Rect> {
+    // What is beside the part tells each view's own depth error, and is known better once the part is.
+    let first = fitted(seen, config)?;
+    fitted(&Seen { rect: &first, ..*seen }, config)
+}
+
+fn fitted(seen: &Seen, config: &config::Fitting) -> Option<Rect> {
     let evidence = Evidence::of(seen, config);
     let marks = [0, 1].map(|axis| Marks::of(axis, &evidence.grid, seen.stops));
     let hinge = hinge_side(seen.face, seen.joint);
@@ -285,15 +291,8 @@ mod tests {
             .collect();
         // What is known before is wrong on all sides.
         let wider = Rect { bounds: drawn::rect().bounds.map(|b| [b[0] - 0.1, b[1] + 0.1]) };
-        let seen = Seen {
-            face: &face,
-            rect: &wider,
-            surface: &surface,
-            views: &views,
-            joint,
-            openings: &[told; 2],
-            stops,
-        };
+        let seen =
+            Seen { face: &face, rect: &wider, surface: &surface, views: &views, joint, openings: &[told; 2], stops };
         (fit(&seen, &config::Fitting::default()), drawn::rect())
     }
 

@@ -224,8 +224,11 @@ impl CellVotes {
         let (mut seen, mut against) = (0usize, 0usize);
         for i in 0..steps(strip) {
             for k in 0..steps(across) {
-                let (x, y) = (strip[0] + (i as f64 + 0.5) * self.grid.cell_m, across[0] + (k as f64 + 0.5) * self.grid.cell_m);
-                let Some(cell) = (if axis == 0 { self.grid.index(x, y) } else { self.grid.index(y, x) }) else { continue };
+                let (x, y) =
+                    (strip[0] + (i as f64 + 0.5) * self.grid.cell_m, across[0] + (k as f64 + 0.5) * self.grid.cell_m);
+                let Some(cell) = (if axis == 0 { self.grid.index(x, y) } else { self.grid.index(y, x) }) else {
+                    continue;
+                };
                 let (still, gone) = (self.still[cell], self.gone[cell]);
                 seen += usize::from(still != gone);
                 against += usize::from(if added { still > gone } else { gone > still });
@@ -256,7 +259,9 @@ impl CellVotes {
                     let known = cells.iter().filter(|&&i| self.still[i] > 0).count();
                     let stopped = stops.iter().any(|(a, offset, span)| {
                         let covers = span[1].min(across[1]) - span[0].max(across[0]);
-                        *a == axis && (offset - edge).abs() <= self.grid.cell_m && covers > 0.4 * (across[1] - across[0])
+                        *a == axis
+                            && (offset - edge).abs() <= self.grid.cell_m
+                            && covers > 0.4 * (across[1] - across[0])
                     });
                     if stopped || 2 * face < count || 2 * known > count {
                         break;
