@@ -3,14 +3,14 @@
 //!
 //! Before the joint is known [`super::outline`] says roughly what moved. With it, every cell of the face is asked the same
 //! in every view: is there a surface where the joint would have taken it, and is its closed place seen through? A cell beside
-//! the hinge has no answer, so a door goes on to its hinge; what an open drawer hides has none either. Gaps between fronts are
-//! lines, the grip is on the part, and parts are as large as fronts are.
+//! the hinge has no answer, so a door goes on to its hinge; below an open drawer its place would be in the air, which is seen
+//! through. Gaps between fronts are lines, the grip is on the part, and parts are as large as fronts are.
 
 use super::Face;
 use super::face::Rect;
 use super::leaf::{self, Leaf};
 use super::moved::{View, tolerance};
-use super::outline::Grid;
+use super::outline::{Grid, SMALLEST};
 use crate::articulation::{Articulation, JointKind};
 use crate::config;
 use crate::math::{Point, Pose};
@@ -41,14 +41,17 @@ pub struct Seen<'a> {
 const LEAST_M: f64 = 0.08;
 /// A front of 15 x 15 cm is the smallest drawer, square metres.
 const LEAST_MOVED_M2: f64 = 0.02;
-/// Errors of depth share their fate over so much, metres: a spot of that size that moved in all views is worth a nat.
+/// Cells are no smaller, metres: sides come from lines.
+const LEAST_CELL_M: f64 = 0.01;
+/// Errors of depth share their fate over so much, metres: a spot of that size that moved in all of many views is worth a nat.
+/// This and the next are of the size that outlines of the development seeds have best, and hardly matter by a factor of 1.5.
 const SPOT_M: f64 = 0.07;
-/// Where no surface was seen there is hardly a front: a share of what a cell that stayed counts.
-const BARE: f64 = 0.3;
-/// Of a grip across its motion, once its face has its origin there, metres.
-const GRIP_STD_M: f64 = 0.08;
 /// A side all along a line against one beside it, nats.
 const ON_LINE: f64 = 3.0;
+/// Where no view says anything and no surface was seen there is hardly a front: a share of what a cell that stayed counts.
+const BARE: f64 = 0.3;
+/// Standard deviation of how far outside its part the grip may lie, metres.
+const GRIP_STD_M: f64 = 0.08;
 /// Width and height of fronts, log-normal: metres, and the standard deviation of their logarithms.
 const MEDIAN_M: f64 = 0.42;
 const SPREAD: f64 = 0.6;
@@ -62,7 +65,7 @@ const MOST_HINGE: f64 = 4.5;
 pub fn fit(seen: &Seen, config: &config::Fitting) -> Option<Rect> {
     // What is beside the part tells each view's own depth error, and is known better once the part is.
     let first = fitted(seen, config)?;
-    fitted(&Seen { rect: &first, ..*seen }, config)
+    fitted(&Seen { rect: &first, ..*seen }, config).or(Some(first))
 }
 
 fn fitted(seen: &Seen, config: &config::Fitting) -> Option<Rect> {
@@ -75,18 +78,20 @@ fn fitted(seen: &Seen, config: &config::Fitting) -> Option<Rect> {
         let lines = [0, 1].map(|k| at[k].map(|i| marks[k].covered(i, rect.bounds[1 - k])).iter().sum::<f64>());
         evidence.nats(&rect) + prior(&rect, hinge) + ON_LINE * lines.iter().sum::<f64>()
     };
-    let start = |bounds: [[f64; 2]; 2]| climbed([0, 1].map(|k| bounds[k].map(|x| marks[k].nearest(x))), &marks, worth);
     // From what is known, from the grip alone, and from all that can be seen.
-    let grid = &evidence.grid;
-    let all = [[0, grid.columns], [0, grid.rows]];
-    let all = [0, 1].map(|k| all[k].map(|i| grid.origin[k] + i as f64 * grid.cell_m));
-    let starts = [seen.rect.bounds, super::outline::SMALLEST.bounds, all];
-    let (_, at) = starts.into_iter().map(start).reduce(|best, next| if next.0 > best.0 { next } else { best })?;
+    let starts = [
+        [0, 1].map(|k| seen.rect.bounds[k].map(|x| marks[k].nearest(x))),
+        [0, 1].map(|k| SMALLEST.bounds[k].map(|x| marks[k].nearest(x))),
+        [0, 1].map(|k| [0, marks[k].offsets.len() - 1]),
+    ];
+    let climbed = starts.map(|start| climbed(start, &marks, worth));
+    let (_, at) = climbed.into_iter().reduce(|best, next| if next.0 > best.0 { next } else { best })?;
     let rect = rect_at(&at);
     (evidence.moved_m2(&rect) >= LEAST_MOVED_M2).then_some(rect)
 }
 
-/// The best rectangle that is reached by choosing both sides along one axis, then along the other, until neither changes.
+/// The best rectangle that is reached by choosing both sides along one axis, then along the other, until neither changes; and
+/// its worth.
 fn climbed(
     start: [[usize; 2]; 2],
     marks: &[Marks; 2],
@@ -98,13 +103,16 @@ fn climbed(
     for _ in 0..ROUNDS {
         let before = at;
         for k in [0, 1] {
-            let count = marks[k].offsets.len();
-            for (low, high) in (0..count).flat_map(|low| (low + 1..count).map(move |high| (low, high))) {
-                let mut next = at;
-                next[k] = [low, high];
-                let value = worth(&next);
-                if value > best {
-                    (best, at) = (value, next);
+            let offsets = &marks[k].offsets;
+            for low in 0..offsets.len() {
+                let wide = offsets.partition_point(|x| *x < offsets[low] + LEAST_M);
+                for high in wide..offsets.len() {
+                    let mut next = at;
+                    next[k] = [low, high];
+                    let value = worth(&next);
+                    if value > best {
+                        (best, at) = (value, next);
+                    }
                 }
             }
         }
@@ -131,8 +139,10 @@ fn prior(rect: &Rect, hinge: Option<(usize, f64)>) -> f64 {
     -0.5 * usual.iter().chain(&off).sum::<f64>() - hung
 }
 
-/// Where a hinge bounds its part: (0 = upright or 1 = level, offset) in face coordinates.
+/// Where a hinge bounds its part: (0 = upright or 1 = level, offset) in face coordinates. `None` for slides, and for hinges that
+/// run along no side.
 fn hinge_side(face: &Face, joint: &Articulation) -> Option<(usize, f64)> {
+    /// A cosine.
     const ALONG: f64 = 0.9;
     let at = face.coordinates(&joint.origin);
     let along = [face.up, face.right].map(|a| joint.axis.dot(&a).abs());
@@ -180,21 +190,24 @@ impl Marks {
 /// What the views say of each cell, summed over all cells to the lower left of each corner of cells.
 struct Evidence {
     grid: Grid,
-    /// From -1, stayed, to 1, moved; less [`BARE`] where there is no surface.
+    /// From -1, stayed, to 1, moved; minus [`BARE`] where nothing is known.
     weights: Vec<f64>,
-    /// Cells that moved.
+    /// Cells that moved at all.
     moved: Vec<f64>,
 }
 
 impl Evidence {
     fn of(seen: &Seen, config: &config::Fitting) -> Self {
         let Seen { face, rect, surface, views, joint, openings, .. } = *seen;
-        let grid = Grid::of(face, config);
+        /// Of the weights, for a cell that moved at all: where a part is half hidden its lines and its grip tell the rest, and
+        /// they do so better than what was known before.
+        const AT_ALL: f64 = 0.02;
+        let grid = Grid::of(face, config.cell_m.max(LEAST_CELL_M));
         let cells = (0..grid.columns * grid.rows).map(|i| {
             let [right, up] = grid.center(i);
             face.point(right, up, 0.0)
         });
-        let front = Leaf::through(cells.collect(), face.normal);
+        let front = Leaf::through(cells.collect(), face.normal, config.board_m);
         let shut = Pose::identity();
         let mut told = vec![(0.0, 0.0); front.points().len()];
         for (view, opening) in views.iter().zip(openings) {
@@ -203,19 +216,27 @@ impl Evidence {
             for (here, (sum, count)) in front.points().iter().zip(&mut told) {
                 let at = |motion: &Pose| {
                     let seen = front.behind(here, motion, view)?;
-                    Some(there(bias_m - seen.along_normal, seen.depth))
+                    // A view that sees the back of the leaf looks along its normal.
+                    let back = seen.normal.dot(&(seen.at - view.eye)) > 0.0;
+                    let behind = if back { seen.along_normal } else { -seen.along_normal };
+                    Some(there(behind + bias_m, seen.depth))
                 };
-                if let Some((open, closed)) = at(&motion).zip(at(&shut)) {
+                // A leaf that is edge-on or out of the picture is not where it was, for all that.
+                if let Some(closed) = at(&shut) {
+                    let open = at(&motion).unwrap_or(0.0);
                     *sum += 0.5 * (open - closed);
-                    *count += 1.0;
+                    *count += open.abs().max(closed.abs());
                 }
             }
         }
+        /// Surface points are a voxel apart, metres.
+        const BARE_M: f64 = 0.02;
         let closed = grid.surface(face, surface);
         let bare = |i: usize| {
+            let reach = (BARE_M / grid.cell_m).ceil() as usize;
             let (c, r) = (i % grid.columns, i / grid.columns);
-            let mut near = (r.saturating_sub(1)..(r + 2).min(grid.rows))
-                .flat_map(|r| (c.saturating_sub(1)..(c + 2).min(grid.columns)).map(move |c| (r, c)));
+            let mut near = (r.saturating_sub(reach)..(r + reach + 1).min(grid.rows))
+                .flat_map(|r| (c.saturating_sub(reach)..(c + reach + 1).min(grid.columns)).map(move |c| (r, c)));
             near.all(|(r, c)| closed[r * grid.columns + c] == 0)
         };
         // One view is worth half of many: they share the depth's errors.
@@ -224,8 +245,8 @@ impl Evidence {
             .enumerate()
             .map(|(i, (sum, count))| if bare(i) { -BARE } else { sum / (count + 1.0) })
             .collect();
-        let moved = weights.iter().map(|w| f64::from(u8::from(*w > 0.0)));
-        let moved = summed(&grid, &moved.collect::<Vec<f64>>());
+        let moved: Vec<f64> = weights.iter().map(|w| f64::from(u8::from(*w > AT_ALL))).collect();
+        let moved = summed(&grid, &moved);
         Self { weights: summed(&grid, &weights), moved, grid }
     }
 
@@ -282,7 +303,8 @@ mod tests {
         let poses = [drawn::pose(Point::new(0.3, -1.0, 0.5)), drawn::pose(Point::new(-0.2, -1.1, 0.4))];
         let sketches = poses.map(|pose| drawn::sketch(&pose, joint, opening));
         let views: Vec<View> = sketches.iter().zip(&poses).map(|(s, pose)| drawn::view(s, pose, face.center)).collect();
-        let [right, up] = [0, 1].map(|k| face.extent[k]);
+        // Surface there is beyond the part, too, as far as its cells go.
+        let [right, up] = [0, 1].map(|k| [face.extent[k][0] - 0.1, face.extent[k][1] + 0.1]);
         let surface: Vec<Point> = (0..200 * 200)
             .map(|i| {
                 let at = |b: [f64; 2], k: usize| b[0] + (b[1] - b[0]) * k as f64 / 199.0;
@@ -320,12 +342,22 @@ mod tests {
     }
 
     #[test]
-    fn sides_lie_on_lines_next_to_them_and_not_on_others() {
-        let truth = drawn::rect();
-        let [[left, right], [bottom, top]] = truth.bounds;
-        let line = |offset: f64| (0, offset, [bottom, top]);
-        let (rect, _) = found(&door(), 0.8, 0.8, &[line(right), line(0.3 * left + 0.7 * right)]);
-        assert!((rect.unwrap().bounds[0][1] - right).abs() < 1e-3, "{rect:?}");
+    fn a_side_lies_on_a_line_next_to_it() {
+        let [[left, right], [bottom, top]] = drawn::rect().bounds;
+        // Between two cells, where no side is without it.
+        let next_to = right + 0.013;
+        let lines = [(0, next_to, [bottom, top]), (0, 0.3 * left + 0.7 * right, [bottom, top])];
+        for (stops, on) in [(&lines[..], true), (&[], false)] {
+            let (rect, _) = found(&door(), 0.8, 0.8, stops);
+            assert_eq!((rect.unwrap().bounds[0][1] - next_to).abs() < 1e-3, on, "{rect:?}");
+        }
+    }
+
+    #[test]
+    fn a_leaf_that_swung_past_the_eye_is_known_by_its_back() {
+        // Of a door of 1.9 radians both eyes see the inside.
+        let (rect, truth) = found(&door(), 1.9, 1.9, &[]);
+        assert!(worst(&rect.unwrap(), &truth) < 0.05, "{rect:?}");
     }
 
     #[test]

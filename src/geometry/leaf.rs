@@ -53,9 +53,9 @@ impl Leaf {
         Self { points, normal: face.normal, board_m }
     }
 
-    /// A front of any points, without a back.
-    pub(super) fn through(points: Vec<Point>, normal: Vector) -> Self {
-        Self { points, normal, board_m: 0.0 }
+    /// A front of any points.
+    pub(super) fn through(points: Vec<Point>, normal: Vector, board_m: f64) -> Self {
+        Self { points, normal, board_m }
     }
 
     /// Out of the closed front.
@@ -96,7 +96,7 @@ pub(super) fn shows(leaf: &Leaf, view: &View) -> bool {
     seen as f64 >= LEAST_SEEN * leaf.points().len() as f64
 }
 
-/// How far the front beside the leaf lies behind the face in a view, metres: an error of that view's depth, which the leaf
+/// How far the front beside the leaf is seen out of the face in a view, along its normal, metres: an error of that view's depth, which the leaf
 /// shares. Zero where too little of the front is seen.
 pub(super) fn front_bias_m(face: &Face, rect: &Rect, view: &View) -> f64 {
     /// What is further off is another surface, metres.

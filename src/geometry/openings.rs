@@ -261,7 +261,7 @@ fn standing(leaf: &Leaf, joint: &Articulation, clip: &OpenState, views: &[Seen],
         let motion = joint.motion(x);
         let was_free = |p: &Point| {
             let at = motion * p;
-            // Laid on its neighbours a door shows what they show.
+            // Laid on its neighbours a door shows what they show; near its closed place every leaf is.
             (at - p).dot(&leaf.normal()).abs() > TIGHT_M
                 && clip.closed.iter().any(|v| v.gap(&at).is_some_and(|(gap, _)| gap >= TIGHT_M))
                 && !was_there(clip.closed, &at)

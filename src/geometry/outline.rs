@@ -46,7 +46,7 @@ pub fn vote(
     joint: Option<(&Articulation, &[f64])>,
     config: &config::Fitting,
 ) -> CellVotes {
-    let grid = Grid::of(face, config);
+    let grid = Grid::of(face, config.cell_m);
     let cells = grid.columns * grid.rows;
     let mut votes =
         CellVotes { closed: grid.surface(face, surface), still: vec![0; cells], gone: vec![0; cells], grid };
@@ -81,14 +81,14 @@ pub fn vote(
 
 impl Grid {
     /// Over the face's visible extent, at most 1.2 m from the grip.
-    pub(super) fn of(face: &Face, config: &config::Fitting) -> Self {
+    pub(super) fn of(face: &Face, cell_m: f64) -> Self {
         const REACH_M: f64 = 1.2;
         // The extent comes from the confident region; its rim is a voxel coarse.
         const MARGIN_M: f64 = 0.1;
         let low = [0, 1].map(|i| (face.extent[i][0] - MARGIN_M).max(-REACH_M));
         let high = [0, 1].map(|i| (face.extent[i][1] + MARGIN_M).min(REACH_M));
-        let [columns, rows] = [0, 1].map(|i| ((high[i] - low[i]) / config.cell_m).ceil().max(1.0) as usize);
-        Self { cell_m: config.cell_m, origin: low, columns, rows }
+        let [columns, rows] = [0, 1].map(|i| ((high[i] - low[i]) / cell_m).ceil().max(1.0) as usize);
+        Self { cell_m, origin: low, columns, rows }
     }
 
     /// Surface points on the closed plane, cell by cell.
