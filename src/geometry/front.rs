@@ -10,13 +10,10 @@ use super::Face;
 use super::face::Rect;
 use super::leaf::{self, Leaf};
 use super::moved::{View, tolerance};
-use super::outline::{Grid, SMALLEST};
+use super::outline::{Grid, SMALLEST, Stop};
 use crate::articulation::{Articulation, JointKind};
 use crate::config;
 use crate::math::{Point, Pose};
-
-/// A line on a face along one of its axes: (0 = upright or 1 = level, offset, from, to) in face coordinates, metres.
-pub type Stop = (usize, f64, [f64; 2]);
 
 /// A part as it was seen.
 #[derive(Debug, Clone, Copy)]

@@ -5,11 +5,13 @@
 
 use super::Face;
 use super::face::Rect;
-use super::front::Stop;
 use super::moved::{View, tolerance};
 use crate::articulation::Articulation;
 use crate::config;
 use crate::math::Point;
+
+/// A line on a face along one of its axes: (0 = upright or 1 = level, offset, from, to) in face coordinates, metres.
+pub type Stop = (usize, f64, [f64; 2]);
 
 /// Cells of a face, row by row from its lower left.
 #[derive(Debug, Clone)]
@@ -125,7 +127,8 @@ impl Grid {
 impl CellVotes {
     /// The rectangle of the connected piece of moved cells at the grip; `None` where nothing there is seen to move.
     ///
-    /// Where no open view looked, the part goes on: over its closed face up to an edge (`stops`: lines on the face), up to what is seen to stay, or up to the face's end.
+    /// Where no open view looked, the part goes on: over its closed face up to an edge (`stops`: lines on the face), up to what
+    /// is seen to stay, or up to the face's end.
     #[must_use]
     pub fn moving_rect(&self, stops: &[Stop]) -> Option<Rect> {
         let seen = self.seen_rect()?;

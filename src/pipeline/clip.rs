@@ -7,7 +7,7 @@ use crate::articulation::Outcome;
 use crate::config::{Config, InferenceMethod, LineMethod};
 use crate::error::Result;
 use crate::geometry::Rect;
-use crate::geometry::front::Stop;
+use crate::geometry::outline::Stop;
 use crate::geometry::segments::LiftedSegment;
 use crate::geometry::{Face, LineTrack, ManhattanFrame, candidates, face, moved, outline, sights, tracks};
 use crate::hands::{self, Trajectory};

@@ -373,7 +373,7 @@ struct Around {
     /// Points of the furniture, world.
     surface: Vec<Point>,
     /// Lines on its face.
-    stops: Vec<front::Stop>,
+    stops: Vec<outline::Stop>,
 }
 
 /// Of the clip that saw the closed part best.
