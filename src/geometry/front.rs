@@ -41,13 +41,15 @@ const LEAST_MOVED_M2: f64 = 0.02;
 /// Cells are no smaller, metres: sides come from lines.
 const LEAST_CELL_M: f64 = 0.01;
 /// Errors of depth share their fate over so much, metres: a spot of that size that moved in all of many views is worth a nat.
-/// This and the next are of the size that outlines of the development seeds have best, and hardly matter by a factor of 1.5.
+/// Set by judgement, as the other values here are but for the grip's deviation.
 const SPOT_M: f64 = 0.07;
 /// A side all along a line against one beside it, nats.
 const ON_LINE: f64 = 3.0;
-/// Where no view says anything and no surface was seen there is hardly a front: a share of what a cell that stayed counts.
+/// Where no surface was seen while the part was closed there is hardly a front, whatever is seen there later: a share of what a
+/// cell that stayed counts.
 const BARE: f64 = 0.3;
-/// Standard deviation of how far outside its part the grip may lie, metres.
+/// Standard deviation of how far outside its part the grip may lie, metres: 4 cm was too little at large errors of hands
+/// (development seeds).
 const GRIP_STD_M: f64 = 0.08;
 /// Width and height of fronts, log-normal: metres, and the standard deviation of their logarithms.
 const MEDIAN_M: f64 = 0.42;
@@ -187,7 +189,7 @@ impl Marks {
 /// What the views say of each cell, summed over all cells to the lower left of each corner of cells.
 struct Evidence {
     grid: Grid,
-    /// From -1, stayed, to 1, moved; minus [`BARE`] where nothing is known.
+    /// From -1, stayed, to 1, moved; minus [`BARE`] where no surface was.
     weights: Vec<f64>,
     /// Cells that moved at all.
     moved: Vec<f64>,
@@ -195,10 +197,12 @@ struct Evidence {
 
 impl Evidence {
     fn of(seen: &Seen, config: &config::Fitting) -> Self {
-        let Seen { face, rect, surface, views, joint, openings, .. } = *seen;
         /// Of the weights, for a cell that moved at all: where a part is half hidden its lines and its grip tell the rest, and
         /// they do so better than what was known before.
         const AT_ALL: f64 = 0.02;
+        /// Surface points are samples of depth images: gaps of this size are none of the surface's, metres.
+        const BARE_M: f64 = 0.02;
+        let Seen { face, rect, surface, views, joint, openings, .. } = *seen;
         let grid = Grid::of(face, config.cell_m.max(LEAST_CELL_M));
         let cells = (0..grid.columns * grid.rows).map(|i| {
             let [right, up] = grid.center(i);
@@ -226,11 +230,9 @@ impl Evidence {
                 }
             }
         }
-        /// Surface points are a voxel apart, metres.
-        const BARE_M: f64 = 0.02;
         let closed = grid.surface(face, surface);
+        let reach = (BARE_M / grid.cell_m).ceil() as usize;
         let bare = |i: usize| {
-            let reach = (BARE_M / grid.cell_m).ceil() as usize;
             let (c, r) = (i % grid.columns, i / grid.columns);
             let mut near = (r.saturating_sub(reach)..(r + reach + 1).min(grid.rows))
                 .flat_map(|r| (c.saturating_sub(reach)..(c + reach + 1).min(grid.columns)).map(move |c| (r, c)));
