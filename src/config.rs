@@ -237,6 +237,8 @@ block! {
         shared_errors: f64 = 3.0, "-", "ours";
         /// Fit the hinge and the openings to the depth of the open state.
         refit: bool = true, "-", "ours";
+        /// Judge each joint of the scene once more with the outlines that were fitted to what it could be.
+        second_look: bool = true, "-", "ours";
         /// Merge clips of one joint into one scene-level joint.
         merge_clips: bool = true, "-", "C.2";
         /// Clips whose closed grips are nearer than this can be one joint.

@@ -211,31 +211,14 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
                 out.push(AxisCandidate { side, ..AxisCandidate::at_line(track, direction, named(i)) });
             }
         }
-        // An edge of the face: 0 = upright or 1 = level, its offset across and its middle along, its length.
-        let mut edge = |axis: usize, offset: f64, middle: f64, length_m: f64, source: AxisSource| {
-            let (axis, origin, upright) = match axis {
-                0 => (face.up, face.point(offset, middle, 0.0), true),
-                _ => (face.right, face.point(middle, offset, 0.0), false),
-            };
-            let joint = Articulation { kind: JointKind::Revolute, axis, origin };
-            let side = Some(side_of(offset, upright));
-            out.push(AxisCandidate { side, length_m, ..AxisCandidate::new(joint, source) });
-        };
-        let middles = |rect: &Rect| rect.bounds.map(|b| 0.5 * (b[0] + b[1]));
-        let around_part = evidence.rect.map_or([0.0; 2], middles);
+        let middles = evidence.rect.map_or([0.0; 2], middles);
         for (axis, offset, length_m) in plane_edges(face, evidence.surface) {
-            edge(axis, offset, around_part[1 - axis], length_m, AxisSource::PlaneEdge);
+            out.push(edge(face, axis, offset, middles[1 - axis], length_m, AxisSource::PlaneEdge));
         }
-        let whole = Rect { bounds: face.extent };
-        for (rect, source) in
-            evidence.rect.map(|r| (r, AxisSource::PartEdge)).into_iter().chain([(&whole, AxisSource::FaceEdge)])
-        {
-            for axis in [0, 1] {
-                for offset in rect.bounds[axis] {
-                    edge(axis, offset, middles(rect)[1 - axis], rect.size()[1 - axis], source);
-                }
-            }
+        if let Some(rect) = evidence.rect {
+            out.extend(edges(face, rect, AxisSource::PartEdge));
         }
+        out.extend(edges(face, &Rect { bounds: face.extent }, AxisSource::FaceEdge));
     } else {
         let lines = evidence.tracks.iter().enumerate();
         out.extend(lines.map(|(i, t)| AxisCandidate::at_line(t, t.segment.line.direction, named(i))));
@@ -251,6 +234,45 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
             out.push(AxisCandidate { side, shift, ..AxisCandidate::new(joint, AxisSource::HandArc) });
         }
     }
+}
+
+/// Hinges at the four sides of each outline that a part could have; sides next to each other are one. The sense moves the grip
+/// (world) out of the face.
+#[must_use]
+pub fn at_sides(face: &Face, outlines: &[Rect], grip: &Point) -> Vec<AxisCandidate> {
+    /// Less than an outline's side is known, metres.
+    const ONE_M: f64 = 0.02;
+    let mut out: Vec<AxisCandidate> = Vec::new();
+    for mut hinge in outlines.iter().flat_map(|rect| edges(face, rect, AxisSource::PartEdge)) {
+        hinge.joint = outward(hinge.joint, face, grip);
+        let line = hinge.joint.line();
+        if !out.iter().any(|other| other.side == hinge.side && line.distance(&other.joint.origin) < ONE_M) {
+            out.push(hinge);
+        }
+    }
+    out
+}
+
+/// Hinges at the four sides of a rectangle on a face.
+fn edges(face: &Face, rect: &Rect, source: AxisSource) -> impl Iterator<Item = AxisCandidate> {
+    let (bounds, middles, size) = (rect.bounds, middles(rect), rect.size());
+    [0, 1].into_iter().flat_map(move |axis| {
+        bounds[axis].map(|offset| edge(face, axis, offset, middles[1 - axis], size[1 - axis], source))
+    })
+}
+
+fn middles(rect: &Rect) -> [f64; 2] {
+    rect.bounds.map(|b| 0.5 * (b[0] + b[1]))
+}
+
+/// A hinge at an edge on a face: 0 = upright or 1 = level, its offset across and its middle along, its length, metres.
+fn edge(face: &Face, axis: usize, offset: f64, middle: f64, length_m: f64, source: AxisSource) -> AxisCandidate {
+    let (axis, origin, upright) = match axis {
+        0 => (face.up, face.point(offset, middle, 0.0), true),
+        _ => (face.right, face.point(middle, offset, 0.0), false),
+    };
+    let joint = Articulation { kind: JointKind::Revolute, axis, origin };
+    AxisCandidate { side: Some(side_of(offset, upright)), length_m, ..AxisCandidate::new(joint, source) }
 }
 
 /// Where other sides of the furniture meet its face: (0 = upright edge or 1 = level one, its offset, the length seen), in face

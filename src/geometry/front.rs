@@ -13,7 +13,7 @@ use super::moved::{View, tolerance};
 use super::outline::{Grid, SMALLEST, Stop};
 use crate::articulation::{Articulation, JointKind};
 use crate::config;
-use crate::math::{Point, Pose};
+use crate::math::{Point, Pose, Vector};
 
 /// A part as it was seen.
 #[derive(Debug, Clone, Copy)]
@@ -149,6 +149,26 @@ fn hinge_side(face: &Face, joint: &Articulation) -> Option<(usize, f64)> {
     (joint.kind == JointKind::Revolute).then_some((axis, at[axis]))
 }
 
+/// From a hinge to the side of its part, along the face, metres, where a line runs along that side: fronts are hung at their
+/// sides. `None` without such a line, and for joints without such a side.
+#[must_use]
+pub fn to_lined_side(face: &Face, rect: &Rect, joint: &Articulation, stops: &[Stop]) -> Option<Vector> {
+    /// Sides that were put on a line are that near to it, metres.
+    const ON_M: f64 = 0.005;
+    /// Of the side.
+    const LEAST_SHARE: f64 = 0.5;
+    let (axis, offset) = hinge_side(face, joint)?;
+    let side = rect.bounds[axis][usize::from(offset > 0.0)];
+    let on = stops.iter().filter(|(a, at, _)| *a == axis && (at - side).abs() < ON_M);
+    let lined = on.map(|(.., span)| share_of(rect.bounds[1 - axis], span)).fold(0.0, f64::max);
+    (lined >= LEAST_SHARE).then(|| [face.right, face.up][axis] * (side - offset))
+}
+
+/// Share of a side that a line's span covers; negative where they are apart.
+fn share_of(side: [f64; 2], span: &[f64; 2]) -> f64 {
+    (span[1].min(side[1]) - span[0].max(side[0])) / (side[1] - side[0])
+}
+
 /// Where sides can be along an axis: between cells, and on lines.
 struct Marks {
     offsets: Vec<f64>,
@@ -181,8 +201,7 @@ impl Marks {
 
     /// Share of a side at a mark that lies on a line.
     fn covered(&self, mark: usize, across: [f64; 2]) -> f64 {
-        let share = |span: &[f64; 2]| (span[1].min(across[1]) - span[0].max(across[0])) / (across[1] - across[0]);
-        self.spans[mark].iter().map(share).fold(0.0, f64::max)
+        self.spans[mark].iter().map(|span| share_of(across, span)).fold(0.0, f64::max)
     }
 }
 
@@ -294,7 +313,6 @@ fn summed(grid: &Grid, of: &[f64]) -> Vec<f64> {
 mod tests {
     use super::super::moved::drawn;
     use super::*;
-    use crate::math::Vector;
 
     /// What is found of the drawn leaf after it moved by `opening`, of which `told` is known, and its true outline.
     fn found(joint: &Articulation, opening: f64, told: f64, stops: &[Stop]) -> (Option<Rect>, Rect) {

@@ -8,7 +8,8 @@ use crate::config::Config;
 use crate::geometry::ajar;
 use crate::geometry::moved::{self, Hold};
 use crate::geometry::openings::{self, OpenState, Opening};
-use crate::geometry::{Face, Rect, candidates, outline};
+use crate::geometry::outline::Stop;
+use crate::geometry::{AxisSource, Face, Rect, candidates, front, outline};
 use crate::hands::{self, Trajectory};
 use crate::inference;
 use crate::inference::uncertainty::OpenStates;
@@ -44,18 +45,47 @@ pub(super) struct Closed<'a> {
     pub(super) surface: &'a [Point],
 }
 
+/// A joint and how well its hinge is believed to be known along the front before the depth of the open states is looked at,
+/// a standard deviation in metres.
+#[derive(Clone, Copy)]
+pub(super) struct Believed {
+    pub(super) joint: Articulation,
+    pub(super) hinge_m: f64,
+}
+
+impl Believed {
+    /// What is believed once an outline was fitted to the same joint: a hinge is at the side of its part, and lines tell
+    /// sides better than depth tells hinges. Lines that depth speaks against belong to something else.
+    pub(super) fn at_side(self, fit: &Refitted, face: &Face, rect: &Rect, stops: &[Stop]) -> Self {
+        /// Standard deviations that line and depth may be apart.
+        const AGREE: f64 = 2.5;
+        let line_m = AxisSource::Line.position_std_m();
+        let Some(cov) = fit.depth.hinge_cov_m2 else { return self };
+        let Some(off) = front::to_lined_side(face, rect, &fit.joint, stops) else { return self };
+        if off.norm() > AGREE * cov[1][1].sqrt().hypot(line_m) {
+            return self;
+        }
+        let side = fit.joint.origin + off;
+        let along = off.try_normalize(0.0).unwrap_or(off);
+        let way = along * along.dot(&(side - self.joint.origin));
+        let [own, line] = [self.hinge_m, line_m].map(|std| std.powi(-2));
+        let joint = Articulation { origin: self.joint.origin + way * (line / (own + line)), ..self.joint };
+        Self { joint, hinge_m: (own + line).sqrt().recip() }
+    }
+}
+
 /// The hinge and the openings that the depth of the open states tells. `None` where they were not seen.
-#[allow(clippy::too_many_arguments, reason = "what a group of clips knows")]
 pub(super) fn refitted<'a>(
     recording: &Recording,
     sketches: &'a BTreeMap<usize, Sketch>,
     shown: &[(&ClipResult, &Trajectory)],
-    joint: &Articulation,
+    believed: &Believed,
     closed: &Closed,
     config: &Config,
 ) -> Option<Refitted<'a>> {
     let Closed { face, rect, .. } = closed;
-    let noise = openings::Noise { hinge_m: config.reasoning.hand_std_m, board_m: config.fitting.board_m };
+    let joint = &believed.joint;
+    let noise = openings::Noise { hinge_m: believed.hinge_m, board_m: config.fitting.board_m };
     let views: Vec<Vec<moved::View>> =
         shown.iter().map(|(clip, t)| moved::open_views(recording, sketches, &clip.clip, t)).collect();
     let still: Vec<Vec<moved::View>> =

@@ -11,7 +11,7 @@ use crate::articulation::{Articulation, JointKind};
 use crate::config::{Config, InferenceMethod};
 use crate::geometry::Rect;
 use crate::geometry::sights::{self, Sights};
-use crate::geometry::{AxisCandidate, Face, candidates, front, moved, outline};
+use crate::geometry::{AxisCandidate, AxisSource, Face, candidates, front, moved, outline};
 use crate::hands::{self, Trajectory};
 use crate::inference::{self, aggregate, uncertainty};
 use crate::math::Point;
@@ -139,19 +139,24 @@ fn merged(
         .collect()
 }
 
-/// The candidates of all clips of a part as far as they fit the face of the clip that saw it best.
+/// The candidates of all clips of a part as far as they fit the face of the clip that saw it best. Where outlines are known,
+/// their sides stand for those of the clips' own ones.
 fn pooled(
     clips: &[ClipResult],
     group: &[usize],
     best: usize,
     grip: &Point,
+    outlines: &[Rect],
     config: &crate::config::Inference,
 ) -> Vec<AxisCandidate> {
-    let mut all = clips[best].candidates.clone();
-    let Some(face) = &clips[best].face else { return all };
+    let known = |c: &&AxisCandidate| outlines.is_empty() || c.source != AxisSource::PartEdge;
+    let own = clips[best].candidates.iter().filter(known).cloned();
+    let Some(face) = &clips[best].face else { return own.collect() };
+    let mut all = candidates::at_sides(face, outlines, grip);
+    all.extend(own);
     let snap = config.snap_deg.to_radians();
     for &c in group.iter().filter(|&&c| c != best) {
-        for candidate in &clips[c].candidates {
+        for candidate in clips[c].candidates.iter().filter(known) {
             // The other clips' slides are this face's or the room's, which are there already.
             if candidate.joint.kind == JointKind::Prismatic {
                 continue;
@@ -235,11 +240,17 @@ impl<'a> Group<'a> {
 
 /// One part's joint, and how else it could move.
 fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
-    let judged = judged(group, reasoner)?;
+    let mut judged = judged(group, reasoner, &[])?;
     let Group { clips, members, config, .. } = *group;
+    let around = around(group, judged.best);
+    if config.inference.method == InferenceMethod::Posterior && config.inference.second_look {
+        let outlines: Vec<Rect> = judged.likely.iter().filter_map(|l| built(group, &judged, l, &around).part).collect();
+        if !outlines.is_empty() {
+            judged = self::judged(group, reasoner, &outlines)?;
+        }
+    }
     // What physics will not be asked about is not built.
     let asked = if config.validation.feedback { judged.likely.len() } else { 1 };
-    let around = around(group, judged.best);
     let hypotheses: Vec<Hypothesis> =
         judged.likely.iter().take(asked).map(|l| built(group, &judged, l, &around)).collect();
     let answer = hypotheses.first()?.clone();
@@ -265,7 +276,11 @@ fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
 }
 
 /// All candidates of all clips of one part, judged on every clip: the best explains all of them.
-fn judged(group: &Group, reasoner: &dyn Reasoner) -> Option<Judged> {
+///
+/// `outlines`: of the part on the face of the clip that saw it best, one for each way in which it could move, that of the
+/// likeliest first; none in a first look, which takes what that clip knows. Every candidate is judged under the outline that
+/// suits it best.
+fn judged(group: &Group, reasoner: &dyn Reasoner, outlines: &[Rect]) -> Option<Judged> {
     let Group { recording, sketches, clips, members, config } = *group;
     // The clip that saw the closed part best gives the face, the grip and the part's outline.
     let trust = |c: usize| -> f64 {
@@ -285,15 +300,16 @@ fn judged(group: &Group, reasoner: &dyn Reasoner) -> Option<Judged> {
     let (mut joint, mut type_probability) = (best_joint.joint, best_joint.type_probability);
     let mut joint_probability = best_joint.joint_probability;
     let mut all_likely = Vec::new();
+    let judged_before = members.len() == 1 && outlines.is_empty();
     if members.len() > 1 && config.inference.method == InferenceMethod::Paper {
         // The clips' own joints, one voice each.
         let all: Vec<(Articulation, f64)> =
             members.iter().filter_map(|&c| clips[c].joint.found()).map(|j| (j.joint, 1.0)).collect();
         joint = aggregate::consensus(&joint, &all);
-    } else if members.len() > 1 {
+    } else if !judged_before && config.inference.method == InferenceMethod::Posterior {
         let paths: Vec<Vec<Point>> =
             members.iter().filter_map(|&c| clips[c].trajectory.as_ref()).map(Trajectory::positions).collect();
-        let pooled: Vec<AxisCandidate> = pooled(clips, members, best, &grip, &config.inference)
+        let pooled: Vec<AxisCandidate> = pooled(clips, members, best, &grip, outlines, &config.inference)
             .iter()
             .map(|c| candidates::settled(c, &paths, &config.reasoning))
             .collect();
@@ -310,15 +326,15 @@ fn judged(group: &Group, reasoner: &dyn Reasoner) -> Option<Judged> {
                 })
             });
             let own_grip = trajectory.closed_grip();
-            let contexts: Vec<(Face, Option<Rect>, Point)> = [
-                face.map(|f| (f, clips[best].part, grip)),
-                // Of the best clip all three are one.
-                face.filter(|_| c != best).map(|f| (f, clips[best].part, own_grip)),
-                own.filter(|_| c != best).map(|f| (f, clips[c].part, own_grip)),
-            ]
-            .into_iter()
-            .flatten()
-            .collect();
+            let known: Vec<Option<Rect>> =
+                if outlines.is_empty() { vec![clips[best].part] } else { outlines.iter().copied().map(Some).collect() };
+            let mut contexts: Vec<(Face, Option<Rect>, Point)> = Vec::new();
+            for rect in known {
+                contexts.extend(face.map(|f| (f, rect, grip)));
+                // Of the best clip all of these are one.
+                contexts.extend(face.filter(|_| c != best).map(|f| (f, rect, own_grip)));
+            }
+            contexts.extend(own.filter(|_| c != best).map(|f| (f, clips[c].part, own_grip)));
             let contexts: Vec<(Sights, Point)> =
                 contexts.iter().map(|(f, rect, grip)| (Sights::of(f, rect.as_ref(), &open), *grip)).collect();
             let grip_std_m = hands::grip_std_m(trajectory.closed_end_seen());
@@ -334,7 +350,7 @@ fn judged(group: &Group, reasoner: &dyn Reasoner) -> Option<Judged> {
                 grip,
                 candidates: &pooled,
                 agreement: &agreement,
-                part: clips[best].part.as_ref().map(part_shape),
+                part: outlines.first().or(clips[best].part.as_ref()).map(part_shape),
                 face: face.as_ref(),
                 up: recording.up(),
             }));
@@ -386,6 +402,10 @@ fn around(group: &Group, best: usize) -> Around {
     Around { surface, stops: clip.face.as_ref().map_or_else(Vec::new, |face| clip::edges_on(face, &clip.lines)) }
 }
 
+/// So often hinge and openings, then the outline with them, are fitted: more than the leaf that was known at first shows where
+/// the hinge is. A third round changes hardly a hinge.
+const ROUNDS: usize = 2;
+
 /// A part under one of its joints: which way it opens, then hinge, openings and outline from the depth of the open state.
 fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around) -> Hypothesis {
     let Group { recording, sketches, clips, config, .. } = *group;
@@ -402,34 +422,31 @@ fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around) -> Hy
         }
     };
     let mut widest = moved.iter().copied().fold(0.0, f64::max);
-    // A part of which no outline was seen to move: the piece of it around the grip.
-    let rect = part.unwrap_or(outline::SMALLEST);
     if config.inference.refit
         && let Some(face) = face
-        && let Some(fit) = refit::refitted(
-            recording,
-            sketches,
-            &shown,
-            &joint,
-            &refit::Closed { face, rect, surface: &around.surface },
-            config,
-        )
     {
-        joint = fit.joint;
-        moved = fit.ranges;
-        widest = fit.widest;
-        depth = Some(fit.depth);
-        // With the openings known better the part's outline is, too.
-        let seen = front::Seen {
-            face: &face,
-            rect: &rect,
-            surface: &around.surface,
-            views: &fit.views,
-            joint: &joint,
-            openings: &fit.openings,
-            stops: &around.stops,
-        };
-        part = front::fit(&seen, &config.fitting).or(part);
+        // A part of which no outline was seen to move: the piece of it around the grip.
+        let mut rect = part.unwrap_or(outline::SMALLEST);
+        let start = refit::Believed { joint, hinge_m: config.reasoning.hand_std_m };
+        let mut believed = start;
+        for _ in 0..ROUNDS {
+            let closed = refit::Closed { face, rect, surface: &around.surface };
+            let Some(fit) = refit::refitted(recording, sketches, &shown, &believed, &closed, config) else { break };
+            // With the openings known better the part's outline is, too.
+            let seen = front::Seen {
+                face: &face,
+                rect: &rect,
+                surface: &around.surface,
+                views: &fit.views,
+                joint: &fit.joint,
+                openings: &fit.openings,
+                stops: &around.stops,
+            };
+            part = front::fit(&seen, &config.fitting).or(part);
+            rect = part.unwrap_or(rect);
+            believed = start.at_side(&fit, &face, &rect, &around.stops);
+            (joint, moved, widest, depth) = (fit.joint, fit.ranges, fit.widest, Some(fit.depth));
+        }
     }
     let evidence = uncertainty::Evidence {
         joint: &joint,
