@@ -244,7 +244,11 @@ fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
     let Group { clips, members, config, .. } = *group;
     let around = around(group, judged.best);
     if config.inference.method == InferenceMethod::Posterior && config.inference.second_look {
-        let outlines: Vec<Rect> = judged.likely.iter().filter_map(|l| built(group, &judged, l, &around).part).collect();
+        /// Less likely joints seldom become the answer, and all of them find their place under the others' outlines.
+        const LEAST_SHARE: f64 = 0.05;
+        let worth = judged.likely.iter().enumerate().filter(|(i, l)| *i == 0 || l.share >= LEAST_SHARE);
+        // One round tells how far the part reaches; a second one is for the hinge.
+        let outlines: Vec<Rect> = worth.filter_map(|(_, l)| built(group, &judged, l, &around, 1).part).collect();
         if !outlines.is_empty() {
             judged = self::judged(group, reasoner, &outlines)?;
         }
@@ -252,7 +256,7 @@ fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
     // What physics will not be asked about is not built.
     let asked = if config.validation.feedback { judged.likely.len() } else { 1 };
     let hypotheses: Vec<Hypothesis> =
-        judged.likely.iter().take(asked).map(|l| built(group, &judged, l, &around)).collect();
+        judged.likely.iter().take(asked).map(|l| built(group, &judged, l, &around, ROUNDS)).collect();
     let answer = hypotheses.first()?.clone();
     Some(SceneJoint {
         id: String::new(),
@@ -407,7 +411,7 @@ fn around(group: &Group, best: usize) -> Around {
 const ROUNDS: usize = 2;
 
 /// A part under one of its joints: which way it opens, then hinge, openings and outline from the depth of the open state.
-fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around) -> Hypothesis {
+fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around, rounds: usize) -> Hypothesis {
     let Group { recording, sketches, clips, config, .. } = *group;
     let (best, face) = (judged.best, clips[judged.best].face);
     let shown = group.shown();
@@ -429,7 +433,7 @@ fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around) -> Hy
         let mut rect = part.unwrap_or(outline::SMALLEST);
         let start = refit::Believed { joint, hinge_m: config.reasoning.hand_std_m };
         let mut believed = start;
-        for _ in 0..ROUNDS {
+        for _ in 0..rounds {
             let closed = refit::Closed { face, rect, surface: &around.surface };
             let Some(fit) = refit::refitted(recording, sketches, &shown, &believed, &closed, config) else { break };
             // With the openings known better the part's outline is, too.
