@@ -28,7 +28,7 @@ use crate::fitting;
 use crate::geometry::Face;
 use crate::geometry::candidates::{IN_FACE, outwardness};
 use crate::hands::Trajectory;
-use crate::inference::observed_range;
+use crate::inference::{self, observed_range};
 use crate::math::{Point, Vector};
 use crate::pipeline::{Hypothesis, Scene, SceneJoint};
 use crate::twin::{Part, Solid, Twin};
@@ -230,12 +230,8 @@ fn rechosen(joint: &SceneJoint, against: &[Option<Refutation>], config: &Config)
     };
     hypotheses[..=chosen].rotate_right(1);
     let answer = hypotheses[0].clone();
-    SceneJoint {
-        type_probability: answer.type_share,
-        joint_probability: answer.share,
-        hypotheses,
-        ..joint.under(&answer)
-    }
+    let right = hypotheses.iter().filter(|h| inference::is_right(&answer.joint, &h.joint)).map(|h| h.share).sum();
+    SceneJoint { type_probability: answer.type_share, joint_probability: right, hypotheses, ..joint.under(&answer) }
 }
 
 /// Hypotheses after each lost its nats. What was too unlikely to be listed, and so was not asked about, loses none.

@@ -387,7 +387,7 @@ fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
                 friction,
                 resistance_seen: false,
                 balanced: false,
-                probability: (!plan.joint.hypotheses.is_empty()).then_some(plan.joint.joint_probability),
+                probability: plan.joint.hypotheses.first().map(|h| h.share),
             },
             solids,
             handle,

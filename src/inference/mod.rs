@@ -27,7 +27,8 @@ pub struct ClipJoint {
     pub source: AxisSource,
     /// Probability of the type.
     pub type_probability: f64,
-    /// Probability of the type and the axis: of the weight of all explanations the share that agrees.
+    /// Probability that type and axis are right by the paper's rule: of the weight of all explanations the share under which they
+    /// are, see [`is_right`].
     pub joint_probability: f64,
     /// Root mean square distance of the smoothed hand from the joint's path, metres.
     pub residual_m: f64,
@@ -214,19 +215,34 @@ pub fn explanations(candidates: &[AxisCandidate], answer: &Answer) -> Vec<Explan
     all
 }
 
-/// Of the weight of all joints of `best`'s type the share of those that are the same explanation.
+/// Of the weight of all joints of `best`'s type the share of those with which it would be right by the paper's rule
+/// ([`is_right`]).
 #[must_use]
 pub fn agreeing_share(best: &Articulation, all: &[(Articulation, f64)]) -> f64 {
     let of_type = || all.iter().filter(|(j, _)| j.kind == best.kind);
     let total: f64 = of_type().map(|(_, w)| w).sum();
-    let agreeing: f64 = of_type().filter(|(j, _)| same_axis(j, best)).map(|(_, w)| w).sum();
+    let agreeing: f64 = of_type().filter(|(j, _)| is_right(best, j)).map(|(_, w)| w).sum();
     if total > 0.0 { agreeing / total } else { 0.0 }
 }
 
-/// Whether two joints are one explanation: directions within 8 degrees, hinges within 8 cm.
+/// Whether an answer is right by the paper's rule (§4) if `truth` is the joint: of its type, directions within 15 degrees,
+/// hinges within 25 cm of each other's line.
+#[must_use]
+pub fn is_right(answer: &Articulation, truth: &Articulation) -> bool {
+    const ANGLE_DEG: f64 = 15.0;
+    const HINGE_M: f64 = 0.25;
+    answer.kind == truth.kind && near(answer, truth, ANGLE_DEG, HINGE_M)
+}
+
+/// Whether two joints are one explanation: hand and depth seldom tell joints apart that are within 8 degrees and 8 cm.
 fn same_axis(a: &Articulation, b: &Articulation) -> bool {
-    let near = a.kind == JointKind::Prismatic || a.line().distance(&b.origin) < 0.08;
-    crate::math::unsigned_angle(&a.axis, &b.axis) < 8f64.to_radians() && near
+    near(a, b, 8.0, 0.08)
+}
+
+/// Whether directions without sign, and the lines of hinges, are within these.
+fn near(a: &Articulation, b: &Articulation, angle_deg: f64, hinge_m: f64) -> bool {
+    crate::math::unsigned_angle(&a.axis, &b.axis) <= angle_deg.to_radians()
+        && (a.kind == JointKind::Prismatic || a.line().distance(&b.origin) <= hinge_m)
 }
 
 /// A unit vector as the mean of directions without sign, the first one giving the sense.
@@ -248,6 +264,26 @@ mod tests {
     fn candidate(kind: JointKind, x: f64) -> AxisCandidate {
         let axis = if kind == JointKind::Revolute { Vector::z() } else { -Vector::y() };
         AxisCandidate::new(Articulation { kind, axis, origin: Point::new(x, 0.0, 0.0) }, AxisSource::Line)
+    }
+
+    #[test]
+    fn an_answer_is_as_sure_as_the_joints_under_which_it_would_be_right() {
+        let hinge = |x: f64| candidate(JointKind::Revolute, x).joint;
+        // Another type does not count here, a hinge 20 cm beside is right for the paper, one 30 cm beside is not.
+        let all = [
+            (hinge(0.0), 0.4),
+            (hinge(0.2), 0.3),
+            (hinge(0.3), 0.1),
+            (candidate(JointKind::Prismatic, 0.0).joint, 0.9),
+        ];
+        assert!((agreeing_share(&hinge(0.0), &all) - 0.7 / 0.8).abs() < 1e-12);
+        let turned = |degrees: f64| {
+            let axis = nalgebra::Rotation3::from_axis_angle(&Vector::x_axis(), degrees.to_radians()) * Vector::z();
+            Articulation { axis, ..hinge(0.0) }
+        };
+        assert!(is_right(&hinge(0.0), &turned(14.0)) && !is_right(&hinge(0.0), &turned(16.0)));
+        // The sense of an axis is another question.
+        assert!(is_right(&hinge(0.0), &turned(180.0)));
     }
 
     #[test]

@@ -86,7 +86,8 @@ pub struct SceneJoint {
     pub furniture: Option<String>,
     /// Probability of the type.
     pub type_probability: f64,
-    /// Probability of type and axis.
+    /// Probability that type and axis are right by the paper's rule (15 degrees, 25 cm); how likely just this joint is, is the share of
+    /// the first of `hypotheses`.
     pub joint_probability: f64,
     /// How sure axis, hinge and openings are; `None` for joints that nobody was seen to move.
     #[serde(default)]
