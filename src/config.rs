@@ -388,6 +388,7 @@ impl Config {
         config.inference.use_face_normal = false;
         config.inference.merge_clips = false;
         config.inference.refit = false;
+        config.inference.second_look = false;
         config.validation.feedback = false;
         config
     }

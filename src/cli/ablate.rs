@@ -20,7 +20,7 @@ use crate::report::table::aligned;
 use crate::vlm::Usage;
 
 /// The configurations that are compared where none are named.
-const BUILT_IN: [(&str, &str); 18] = [
+const BUILT_IN: [(&str, &str); 19] = [
     ("ours", include_str!("../../examples/ablations/ours.toml")),
     ("ours_clustered_room", include_str!("../../examples/ablations/ours_clustered_room.toml")),
     ("ours_no_closed_state", include_str!("../../examples/ablations/ours_no_closed_state.toml")),
@@ -30,6 +30,7 @@ const BUILT_IN: [(&str, &str); 18] = [
     ("ours_no_hand_filter", include_str!("../../examples/ablations/ours_no_hand_filter.toml")),
     ("ours_no_merge", include_str!("../../examples/ablations/ours_no_merge.toml")),
     ("ours_no_occlusion", include_str!("../../examples/ablations/ours_no_occlusion.toml")),
+    ("ours_no_second_look", include_str!("../../examples/ablations/ours_no_second_look.toml")),
     ("ours_paper_rule", include_str!("../../examples/ablations/ours_paper_rule.toml")),
     ("ours_unprojected_lines", include_str!("../../examples/ablations/ours_unprojected_lines.toml")),
     ("ours_untempered", include_str!("../../examples/ablations/ours_untempered.toml")),

@@ -397,16 +397,50 @@ pub fn arc_about(path: &[Point], direction: &Vector) -> Option<Articulation> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_side_of_a_cupboard_meets_its_front_at_its_edge() {
-        let face = Face {
+    fn face() -> Face {
+        Face {
             center: Point::new(0.0, 0.0, 1.0),
             right: Vector::x(),
             up: Vector::z(),
             normal: -Vector::y(),
             extent: [[-0.3, 0.3]; 2],
             support: 1.0,
-        };
+        }
+    }
+
+    #[test]
+    fn a_part_may_be_hung_at_each_side_of_each_outline_and_opens_outwards() {
+        let face = face();
+        // The second outline shares three sides with the first, up to less than outlines are known.
+        let outlines = [Rect { bounds: [[-0.4, 0.1], [-0.2, 0.2]] }, Rect { bounds: [[-0.25, 0.11], [-0.2, 0.21]] }];
+        let found = at_sides(&face, &outlines, &face.center);
+        let sides: Vec<(HingeSide, f64)> = found
+            .iter()
+            .map(|c| {
+                let [right, up, _] = face.coordinates(&c.joint.origin);
+                (c.side.unwrap(), if c.joint.axis.z.abs() > 0.5 { right } else { up })
+            })
+            .collect();
+        let want = [
+            (HingeSide::Left, -0.4),
+            (HingeSide::Right, 0.1),
+            (HingeSide::Bottom, -0.2),
+            (HingeSide::Top, 0.2),
+            (HingeSide::Left, -0.25),
+        ];
+        assert!(
+            sides.len() == 5 && sides.iter().zip(want).all(|(a, b)| a.0 == b.0 && (a.1 - b.1).abs() < 1e-12),
+            "{sides:?}"
+        );
+        for c in &found {
+            let way = c.joint.motion(0.3) * face.center - face.center;
+            assert!(way.dot(&face.normal) > 0.01 && c.source == AxisSource::PartEdge, "{c:?}");
+        }
+    }
+
+    #[test]
+    fn a_side_of_a_cupboard_meets_its_front_at_its_edge() {
+        let face = face();
         let side: Vec<Point> = (0..900)
             .map(|i| {
                 Point::new(0.302 + 0.002 * f64::from(i % 3), 0.01 * f64::from(i % 30), 0.7 + 0.02 * f64::from(i / 30))

@@ -371,6 +371,27 @@ mod tests {
     }
 
     #[test]
+    fn a_hinge_is_at_the_side_of_its_part_where_a_line_tells_that_side() {
+        let (face, rect) = (drawn::face(), drawn::rect());
+        let [[left, right], [bottom, top]] = rect.bounds;
+        let door = |offset: f64| Articulation { origin: face.point(offset, 0.0, 0.0), ..door() };
+        let line = |axis: usize, at: f64, share: f64| [(axis, at, [bottom, bottom + share * (top - bottom)])];
+        let way = |joint: &Articulation, stops: &[Stop]| to_lined_side(&face, &rect, joint, stops);
+        let near = |found: Option<Vector>, by: f64| found.is_some_and(|v| (v - face.right * by).norm() < 1e-12);
+        // The side that the hinge is nearer to, whichever side of it the hinge is on.
+        assert!(near(way(&door(left + 0.04), &line(0, left, 0.9)), -0.04));
+        assert!(near(way(&door(right + 0.03), &line(0, right, 0.9)), -0.03));
+        // Lines along less than half of it, beside it, along another side, and none; joints without a side.
+        for stops in
+            [&line(0, left, 0.4)[..], &line(0, left + 0.02, 0.9), &line(1, bottom, 0.9), &line(0, right, 0.9), &[]]
+        {
+            assert!(way(&door(left + 0.04), stops).is_none(), "{stops:?}");
+        }
+        let drawer = Articulation { kind: JointKind::Prismatic, axis: -Vector::y(), origin: Point::origin() };
+        assert!(way(&drawer, &line(0, left, 0.9)).is_none());
+    }
+
+    #[test]
     fn a_leaf_that_swung_past_the_eye_is_known_by_its_back() {
         // Of a door of 1.9 radians both eyes see the inside.
         let (rect, truth) = found(&door(), 1.9, 1.9, &[]);

@@ -47,7 +47,7 @@ pub(super) struct Closed<'a> {
 
 /// A joint and how well its hinge is believed to be known along the front before the depth of the open states is looked at,
 /// a standard deviation in metres.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Believed {
     pub(super) joint: Articulation,
     pub(super) hinge_m: f64,
@@ -274,7 +274,9 @@ fn left_where_found(shown: &[(&ClipResult, &Trajectory)], ends: &[Opening]) -> V
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::articulation::JointKind;
     use crate::hands::Sample;
+    use crate::math::Vector;
 
     fn clip(start_frame: usize) -> ClipResult {
         let [clip, narration, verb, noun] = [(); 4].map(|()| String::new());
@@ -286,6 +288,33 @@ mod tests {
         let at = Point::origin();
         let sample = Sample { frame: 0, time_secs: 0.0, observed: at, smoothed: at, accepted: true };
         Trajectory { side: None, samples: vec![sample], action, ends_seen: [true; 2] }
+    }
+
+    #[test]
+    fn a_hinge_is_held_to_a_line_that_depth_does_not_speak_against() {
+        let [x, y, z] = [Vector::x(), -Vector::y(), Vector::z()];
+        let face = Face { center: Point::origin(), right: x, up: z, normal: y, extent: [[-1.0, 1.0]; 2], support: 1.0 };
+        let rect = Rect { bounds: [[-0.4, 0.1], [-0.3, 0.3]] };
+        let stops = [(0, -0.4, [-0.3, 0.3])];
+        // Depth finds the hinge at `found` along the front, to 3 cm.
+        let held = |found: f64, hinge_cov_m2: Option<[[f64; 2]; 2]>, stops: &[Stop]| {
+            let hinge =
+                |at: f64| Articulation { kind: JointKind::Revolute, axis: -z, origin: Point::new(at, 0.01, 0.0) };
+            let depth = OpenStates { across: [y, x], hinge_cov_m2, moved_std: Vec::new() };
+            let (openings, ranges) = (Vec::new(), Vec::new());
+            let fit = Refitted { joint: hinge(found), views: Vec::new(), openings, ranges, widest: 0.0, depth };
+            Believed { joint: hinge(-0.3), hinge_m: 0.02 }.at_side(&fit, &face, &rect, stops)
+        };
+        let three = Some([[1e-4, 0.0], [0.0, 9e-4]]);
+        // As sure as a line tells hinges: half the way, and surer by the root of two. Nothing moves but along the front.
+        let to = held(-0.35, three, &stops);
+        assert!((to.joint.origin - Point::new(-0.35, 0.01, 0.0)).norm() < 1e-12, "{to:?}");
+        assert!((to.hinge_m - 0.02 / 2f64.sqrt()).abs() < 1e-12, "{to:?}");
+        // Nine centimetres are 2.5 standard deviations of 3 and 2 cm together.
+        for (found, cov, stops) in [(-0.3, three, &stops[..]), (-0.35, None, &stops), (-0.35, three, &[])] {
+            let as_before = held(found, cov, stops);
+            assert!(as_before.hinge_m == 0.02 && as_before.joint.origin.x == -0.3, "{found} {as_before:?}");
+        }
     }
 
     #[test]

@@ -243,7 +243,8 @@ fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
     let mut judged = judged(group, reasoner, &[])?;
     let Group { clips, members, config, .. } = *group;
     let around = around(group, judged.best);
-    if config.inference.method == InferenceMethod::Posterior && config.inference.second_look {
+    // Without the depth of the open states there are no other outlines than before.
+    if config.inference.method == InferenceMethod::Posterior && config.inference.second_look && config.inference.refit {
         /// Less likely joints seldom become the answer, and all of them find their place under the others' outlines.
         const LEAST_SHARE: f64 = 0.05;
         let worth = judged.likely.iter().enumerate().filter(|(i, l)| *i == 0 || l.share >= LEAST_SHARE);
