@@ -237,7 +237,8 @@ block! {
         shared_errors: f64 = 3.0, "-", "ours";
         /// Fit the hinge and the openings to the depth of the open state.
         refit: bool = true, "-", "ours";
-        /// Judge each joint of the scene once more with the outlines that were fitted to what it could be.
+        /// Judge each joint of the scene once more with the outlines that were fitted to what it could be: method "posterior"
+        /// with `refit` only.
         second_look: bool = true, "-", "ours";
         /// Merge clips of one joint into one scene-level joint.
         merge_clips: bool = true, "-", "C.2";

@@ -230,22 +230,34 @@ fn rechosen(joint: &SceneJoint, against: &[Option<Refutation>], config: &Config)
     };
     hypotheses[..=chosen].rotate_right(1);
     let answer = hypotheses[0].clone();
-    let right = hypotheses.iter().filter(|h| inference::is_right(&answer.joint, &h.joint)).map(|h| h.share).sum();
-    SceneJoint { type_probability: answer.type_share, joint_probability: right, hypotheses, ..joint.under(&answer) }
+    let right = |of: &[Hypothesis]| -> f64 {
+        of.iter().filter(|h| inference::is_right(&answer.joint, &h.joint)).map(|h| h.share).sum()
+    };
+    // What was too unlikely to be listed and agrees with an answer that stays is counted, too.
+    let unlisted = if chosen == 0 { (joint.joint_probability - right(&joint.hypotheses)).max(0.0) } else { 0.0 };
+    let joint_probability = right(&hypotheses) + unlisted / left(&joint.hypotheses, &nats);
+    SceneJoint { type_probability: answer.type_share, joint_probability, hypotheses, ..joint.under(&answer) }
+}
+
+/// Share that hypotheses of which `of` holds lose with their nats.
+fn lost(hypotheses: &[Hypothesis], nats: &[f64], of: impl Fn(&Hypothesis) -> bool) -> f64 {
+    hypotheses.iter().zip(nats).filter(|(h, _)| of(h)).map(|(h, n)| -(-n).exp_m1() * h.share).sum()
+}
+
+/// What is left of all shares, those of hypotheses that are not listed among them.
+fn left(hypotheses: &[Hypothesis], nats: &[f64]) -> f64 {
+    (1.0 - lost(hypotheses, nats, |_| true)).max(f64::MIN_POSITIVE)
 }
 
 /// Hypotheses after each lost its nats. What was too unlikely to be listed, and so was not asked about, loses none.
 fn reweighed(hypotheses: &[Hypothesis], nats: &[f64]) -> Vec<Hypothesis> {
-    let lost = |of: &dyn Fn(&Hypothesis) -> bool| -> f64 {
-        hypotheses.iter().zip(nats).filter(|(h, _)| of(h)).map(|(h, n)| -(-n).exp_m1() * h.share).sum()
-    };
-    let left = (1.0 - lost(&|_| true)).max(f64::MIN_POSITIVE);
+    let left = left(hypotheses, nats);
     hypotheses
         .iter()
         .zip(nats)
         .map(|(h, n)| Hypothesis {
             share: h.share * (-n).exp() / left,
-            type_share: (h.type_share - lost(&|other| other.joint.kind == h.joint.kind)) / left,
+            type_share: (h.type_share - lost(hypotheses, nats, |other| other.joint.kind == h.joint.kind)) / left,
             ..h.clone()
         })
         .collect()
@@ -405,6 +417,19 @@ mod tests {
         assert_eq!((after.joint, door.refuted.as_deref()), (DRAWER, Some("so")));
         assert_eq!(after.type_probability, drawer.type_share);
         assert!(after.type_probability > 0.6 && after.joint_probability < after.type_probability);
+    }
+
+    #[test]
+    fn an_answer_that_physics_speaks_for_is_surer_with_all_that_agrees_with_it() {
+        let (config, mut joint) = (Config::default(), doubtful());
+        // The answer, one like it 15 cm beside, its rival; 0.03 that are like the answer are not listed.
+        joint.hypotheses[0].share = 0.45;
+        let beside = Articulation { origin: DRAWER.origin + Vector::new(0.15, 0.0, 0.0), ..DRAWER };
+        joint.hypotheses.push(hypothesis(beside, 0.1, 0.605, 0.445));
+        joint.joint_probability = 0.58;
+        let after = rechosen(&joint, &[None, refuted(1.0), None], &config);
+        let left = 1.0 + 0.39 * (-config.validation.refuted_nats).exp_m1();
+        assert!(after.joint == DRAWER && (after.joint_probability - 0.58 / left).abs() < 1e-12, "{after:?}");
     }
 
     #[test]

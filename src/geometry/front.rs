@@ -149,10 +149,11 @@ fn hinge_side(face: &Face, joint: &Articulation) -> Option<(usize, f64)> {
     (joint.kind == JointKind::Revolute).then_some((axis, at[axis]))
 }
 
-/// From a hinge to the side of its part, along the face, metres, where a line runs along that side: fronts are hung at their
-/// sides. `None` without such a line, and for joints without such a side.
+/// From a hinge to the side of its part, on its side of the grip, where a line runs along it: fronts are hung at their sides. A
+/// direction along the face (world, unit), and how far along it, metres. `None` without such a line, and for joints without
+/// such a side.
 #[must_use]
-pub fn to_lined_side(face: &Face, rect: &Rect, joint: &Articulation, stops: &[Stop]) -> Option<Vector> {
+pub fn to_lined_side(face: &Face, rect: &Rect, joint: &Articulation, stops: &[Stop]) -> Option<(Vector, f64)> {
     /// Sides that were put on a line are that near to it, metres.
     const ON_M: f64 = 0.005;
     /// Of the side.
@@ -161,7 +162,7 @@ pub fn to_lined_side(face: &Face, rect: &Rect, joint: &Articulation, stops: &[St
     let side = rect.bounds[axis][usize::from(offset > 0.0)];
     let on = stops.iter().filter(|(a, at, _)| *a == axis && (at - side).abs() < ON_M);
     let lined = on.map(|(.., span)| share_of(rect.bounds[1 - axis], span)).fold(0.0, f64::max);
-    (lined >= LEAST_SHARE).then(|| [face.right, face.up][axis] * (side - offset))
+    (lined >= LEAST_SHARE).then_some(([face.right, face.up][axis], side - offset))
 }
 
 /// Share of a side that a line's span covers; negative where they are apart.
@@ -377,8 +378,11 @@ mod tests {
         let door = |offset: f64| Articulation { origin: face.point(offset, 0.0, 0.0), ..door() };
         let line = |axis: usize, at: f64, share: f64| [(axis, at, [bottom, bottom + share * (top - bottom)])];
         let way = |joint: &Articulation, stops: &[Stop]| to_lined_side(&face, &rect, joint, stops);
-        let near = |found: Option<Vector>, by: f64| found.is_some_and(|v| (v - face.right * by).norm() < 1e-12);
-        // The side that the hinge is nearer to, whichever side of it the hinge is on.
+        let near = |found: Option<(Vector, f64)>, by: f64| {
+            found.is_some_and(|(along, way)| along == face.right && (way - by).abs() < 1e-12)
+        };
+        // The side on the hinge's side of the grip, be the other one nearer, and the hinge on either side of it.
+        assert!(near(way(&door(0.02), &line(0, right, 0.9)), right - 0.02));
         assert!(near(way(&door(left + 0.04), &line(0, left, 0.9)), -0.04));
         assert!(near(way(&door(right + 0.03), &line(0, right, 0.9)), -0.03));
         // Lines along less than half of it, beside it, along another side, and none; joints without a side.

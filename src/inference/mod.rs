@@ -225,8 +225,8 @@ pub fn agreeing_share(best: &Articulation, all: &[(Articulation, f64)]) -> f64 {
     if total > 0.0 { agreeing / total } else { 0.0 }
 }
 
-/// Whether an answer is right by the paper's rule (§4) if `truth` is the joint: of its type, directions within 15 degrees,
-/// hinges within 25 cm of each other's line.
+/// Whether an answer is right if `truth` is the joint, by the paper's limits (§4) as [`crate::evaluation::Rule::PawsLine`] reads
+/// them: of its type, directions within 15 degrees, the true hinge within 25 cm of the answer's line.
 #[must_use]
 pub fn is_right(answer: &Articulation, truth: &Articulation) -> bool {
     const ANGLE_DEG: f64 = 15.0;

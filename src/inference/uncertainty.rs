@@ -1,13 +1,14 @@
 //! How sure a joint is: covariances of its axis and its hinge, standard deviations of its openings, in closed form (ours).
 //!
-//! All of it holds where type and hypothesis are right: `joint_probability` says how likely they are. What each part is:
+//! All of it holds where type and hypothesis are right: its hypothesis' `share` says how likely they are. What each part is:
 //!
 //! - An axis of a face or of the room has the error of such a frame: a prior. The hand chose the axis and did not turn
 //!   it.
 //! - A free axis: the prior of its line times what the hands' paths say, a Laplace approximation: the Fisher information
 //!   of an evenly drawn arc or pull.
 //! - A hinge whose open state was seen: the fit of `geometry::openings`, a Laplace approximation (the normal matrix where
-//!   the fit ended, its robust weights held) under the priors that it has, the front's plane and the hand's noise.
+//!   the fit ended, its robust weights held) under the priors that it has: the front's plane, the hand's noise, and a line
+//!   along the part's side where there is one.
 //! - Any other hinge: the prior of its source times what the hands' arcs say of their centre, the radius free: a Laplace
 //!   approximation again, the same Fisher information.
 //! - An opening whose open state was seen: the same fit, all else integrated out; of a part that was found as it was

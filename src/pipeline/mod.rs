@@ -86,8 +86,8 @@ pub struct SceneJoint {
     pub furniture: Option<String>,
     /// Probability of the type.
     pub type_probability: f64,
-    /// Probability that type and axis are right by the paper's rule (15 degrees, 25 cm); how likely just this joint is, is the share of
-    /// the first of `hypotheses`.
+    /// Probability that type, axis (15 degrees) and hinge (25 cm) are right, see [`crate::inference::is_right`]. How likely just
+    /// this joint is, is the share of the first of `hypotheses`.
     pub joint_probability: f64,
     /// How sure axis, hinge and openings are; `None` for joints that nobody was seen to move.
     #[serde(default)]
@@ -113,8 +113,8 @@ pub struct SceneJoint {
 pub struct Hypothesis {
     /// The joint; positive opens.
     pub joint: Articulation,
-    /// Probability of type and axis: of the weight of all explanations the share that agrees. The hypotheses
-    /// of a part share at most 1.
+    /// Probability of just this joint: of the weight of all explanations the share within 8 degrees and 8 cm. The hypotheses of a
+    /// part share at most 1.
     pub share: f64,
     /// Probability of its type.
     pub type_share: f64,

@@ -61,13 +61,11 @@ impl Believed {
         const AGREE: f64 = 2.5;
         let line_m = AxisSource::Line.position_std_m();
         let Some(cov) = fit.depth.hinge_cov_m2 else { return self };
-        let Some(off) = front::to_lined_side(face, rect, &fit.joint, stops) else { return self };
-        if off.norm() > AGREE * cov[1][1].sqrt().hypot(line_m) {
+        let Some((along, off)) = front::to_lined_side(face, rect, &fit.joint, stops) else { return self };
+        if off.abs() > AGREE * cov[1][1].sqrt().hypot(line_m) {
             return self;
         }
-        let side = fit.joint.origin + off;
-        let along = off.try_normalize(0.0).unwrap_or(off);
-        let way = along * along.dot(&(side - self.joint.origin));
+        let way = along * (off + along.dot(&(fit.joint.origin - self.joint.origin)));
         let [own, line] = [self.hinge_m, line_m].map(|std| std.powi(-2));
         let joint = Articulation { origin: self.joint.origin + way * (line / (own + line)), ..self.joint };
         Self { joint, hinge_m: (own + line).sqrt().recip() }

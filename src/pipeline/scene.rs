@@ -149,14 +149,14 @@ fn pooled(
     outlines: &[Rect],
     config: &crate::config::Inference,
 ) -> Vec<AxisCandidate> {
-    let known = |c: &&AxisCandidate| outlines.is_empty() || c.source != AxisSource::PartEdge;
-    let own = clips[best].candidates.iter().filter(known).cloned();
+    let kept = |c: &&AxisCandidate| outlines.is_empty() || c.source != AxisSource::PartEdge;
+    let own = clips[best].candidates.iter().filter(kept).cloned();
     let Some(face) = &clips[best].face else { return own.collect() };
     let mut all = candidates::at_sides(face, outlines, grip);
     all.extend(own);
     let snap = config.snap_deg.to_radians();
     for &c in group.iter().filter(|&&c| c != best) {
-        for candidate in clips[c].candidates.iter().filter(known) {
+        for candidate in clips[c].candidates.iter().filter(kept) {
             // The other clips' slides are this face's or the room's, which are there already.
             if candidate.joint.kind == JointKind::Prismatic {
                 continue;
@@ -196,7 +196,7 @@ struct Likely {
     type_share: f64,
 }
 
-/// The answer and what else is worth a look. `merged`: candidates of several clips, of which those that agree are averaged.
+/// The answer and what else is worth a look. `merged`: judged together, so that those that agree are averaged.
 fn likely(candidates: &[AxisCandidate], answer: &Answer, merged: bool) -> Vec<Likely> {
     // No evidence of a few nats brings less back.
     const LEAST_SHARE: f64 = 0.01;
@@ -240,24 +240,24 @@ impl<'a> Group<'a> {
 
 /// One part's joint, and how else it could move.
 fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
-    let mut judged = judged(group, reasoner, &[])?;
+    let mut look = judged(group, reasoner, &[])?;
     let Group { clips, members, config, .. } = *group;
-    let around = around(group, judged.best);
+    let around = around(group, look.best);
     // Without the depth of the open states there are no other outlines than before.
     if config.inference.method == InferenceMethod::Posterior && config.inference.second_look && config.inference.refit {
         /// Less likely joints seldom become the answer, and all of them find their place under the others' outlines.
         const LEAST_SHARE: f64 = 0.05;
-        let worth = judged.likely.iter().enumerate().filter(|(i, l)| *i == 0 || l.share >= LEAST_SHARE);
+        let worth = look.likely.iter().enumerate().filter(|(i, l)| *i == 0 || l.share >= LEAST_SHARE);
         // One round tells how far the part reaches; a second one is for the hinge.
-        let outlines: Vec<Rect> = worth.filter_map(|(_, l)| built(group, &judged, l, &around, 1).part).collect();
+        let outlines: Vec<Rect> = worth.filter_map(|(_, l)| built(group, &look, l, &around, 1).part).collect();
         if !outlines.is_empty() {
-            judged = self::judged(group, reasoner, &outlines)?;
+            look = judged(group, reasoner, &outlines)?;
         }
     }
     // What physics will not be asked about is not built.
-    let asked = if config.validation.feedback { judged.likely.len() } else { 1 };
+    let asked = if config.validation.feedback { look.likely.len() } else { 1 };
     let hypotheses: Vec<Hypothesis> =
-        judged.likely.iter().take(asked).map(|l| built(group, &judged, l, &around, ROUNDS)).collect();
+        look.likely.iter().take(asked).map(|l| built(group, &look, l, &around, ROUNDS)).collect();
     let answer = hypotheses.first()?.clone();
     Some(SceneJoint {
         id: String::new(),
@@ -268,11 +268,11 @@ fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
             .iter()
             .find_map(|&c| narration::read(&clips[c].clip).furniture)
             .or_else(|| members.iter().find_map(|&c| clips[c].words.as_ref()?.furniture.clone())),
-        type_probability: judged.type_probability,
-        joint_probability: judged.joint_probability,
+        type_probability: look.type_probability,
+        joint_probability: look.joint_probability,
         uncertainty: answer.uncertainty,
-        grip: judged.grip,
-        face: clips[judged.best].face,
+        grip: look.grip,
+        face: clips[look.best].face,
         part: answer.part,
         observed_range: answer.observed_range,
         moved: answer.moved,
@@ -282,9 +282,9 @@ fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
 
 /// All candidates of all clips of one part, judged on every clip: the best explains all of them.
 ///
-/// `outlines`: of the part on the face of the clip that saw it best, one for each way in which it could move, that of the
-/// likeliest first; none in a first look, which takes what that clip knows. Every candidate is judged under the outline that
-/// suits it best.
+/// `outlines`: of the part on the face of the clip that saw it best, one for each way in which it could move and left one, by
+/// falling likelihood; none in a first look, which takes what that clip knows. Every candidate is judged under the outline
+/// that suits it best.
 fn judged(group: &Group, reasoner: &dyn Reasoner, outlines: &[Rect]) -> Option<Judged> {
     let Group { recording, sketches, clips, members, config } = *group;
     // The clip that saw the closed part best gives the face, the grip and the part's outline.
