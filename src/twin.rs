@@ -161,7 +161,8 @@ pub struct Joint {
     /// The opening that a person would expect of such furniture, rad or m; what stands in the way is not counted.
     #[serde(default)]
     pub expected: f64,
-    /// Probability of just this joint (8 degrees, 8 cm) after hand, depth, words and physics; `None` where no inference made the joint.
+    /// Probability of just this joint (8 degrees, 8 cm) after hand, depth, words and physics; `None` where no inference made
+    /// the joint.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub probability: Option<f64>,
     /// Viscous damping, N m s/rad or N s/m.

@@ -96,8 +96,8 @@ pub(super) fn shows(leaf: &Leaf, view: &View) -> bool {
     seen as f64 >= LEAST_SEEN * leaf.points().len() as f64
 }
 
-/// How far the front beside the leaf is seen out of the face in a view, along its normal, metres: an error of that view's depth, which the leaf
-/// shares. Zero where too little of the front is seen.
+/// How far the front beside the leaf is seen out of the face in a view, along its normal, metres: an error of that view's
+/// depth, which the leaf shares. Zero where too little of the front is seen.
 pub(super) fn front_bias_m(face: &Face, rect: &Rect, view: &View) -> f64 {
     /// What is further off is another surface, metres.
     const SAME_M: f64 = 0.1;

@@ -27,8 +27,8 @@ pub struct ClipJoint {
     pub source: AxisSource,
     /// Probability of the type.
     pub type_probability: f64,
-    /// Probability that type and axis are right by the paper's rule: of the weight of all explanations the share under which they
-    /// are, see [`is_right`].
+    /// Probability that type, axis and hinge are right, see [`is_right`]: of the weight of all explanations the share under
+    /// which they are.
     pub joint_probability: f64,
     /// Root mean square distance of the smoothed hand from the joint's path, metres.
     pub residual_m: f64,
@@ -215,8 +215,7 @@ pub fn explanations(candidates: &[AxisCandidate], answer: &Answer) -> Vec<Explan
     all
 }
 
-/// Of the weight of all joints of `best`'s type the share of those with which it would be right by the paper's rule
-/// ([`is_right`]).
+/// Of the weight of all joints of `best`'s type the share of those under which it is right ([`is_right`]).
 #[must_use]
 pub fn agreeing_share(best: &Articulation, all: &[(Articulation, f64)]) -> f64 {
     let of_type = || all.iter().filter(|(j, _)| j.kind == best.kind);

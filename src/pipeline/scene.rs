@@ -311,7 +311,7 @@ fn judged(group: &Group, reasoner: &dyn Reasoner, outlines: &[Rect]) -> Option<J
         let all: Vec<(Articulation, f64)> =
             members.iter().filter_map(|&c| clips[c].joint.found()).map(|j| (j.joint, 1.0)).collect();
         joint = aggregate::consensus(&joint, &all);
-    } else if !judged_before && config.inference.method == InferenceMethod::Posterior {
+    } else if !judged_before {
         let paths: Vec<Vec<Point>> =
             members.iter().filter_map(|&c| clips[c].trajectory.as_ref()).map(Trajectory::positions).collect();
         let pooled: Vec<AxisCandidate> = pooled(clips, members, best, &grip, outlines, &config.inference)
@@ -383,7 +383,7 @@ fn judged(group: &Group, reasoner: &dyn Reasoner, outlines: &[Rect]) -> Option<J
         Some(answer) => answer.joint = joint,
         None => {
             let chosen = uncertainty::chosen(best_joint, &clips[best].candidates);
-            all_likely.push(Likely { joint, chosen, share: 1.0, type_share: 1.0 });
+            all_likely.push(Likely { joint, chosen, share: joint_probability, type_share: 1.0 });
         }
     }
     Some(Judged { best, grip, likely: all_likely, type_probability, joint_probability })
