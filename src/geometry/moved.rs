@@ -14,9 +14,10 @@ use crate::recording::{Camera, Clip, Recording};
 #[derive(Debug, Clone, Copy)]
 pub struct View<'a> {
     /// Rotation from the world's axes to the camera's; the rest of the pose is the eye.
-    camera_from_world: Matrix3<f64>,
+    pub(super) camera_from_world: Matrix3<f64>,
     /// Where the camera is, world.
     pub(super) eye: Point,
+    /// Its pixels are the sketch's samples.
     camera: Camera,
     sketch: &'a Sketch,
     /// What the sketch's depth is multiplied by.
@@ -78,8 +79,7 @@ impl View<'_> {
         let grid = &self.sketch.depth;
         for (y, row) in grid.data.chunks_exact(grid.width.max(1)).enumerate() {
             for (x, z) in row.iter().enumerate().filter(|(_, z)| **z > 0.0) {
-                let (u, v) = self.sketch.pixel(x, y);
-                take(self.camera.unproject(u, v, 1.0).coords, f64::from(*z) * self.factor);
+                take(self.camera.unproject(x as f64, y as f64, 1.0).coords, f64::from(*z) * self.factor);
             }
         }
     }
@@ -87,9 +87,13 @@ impl View<'_> {
     /// How far behind the world point `p` the seen surface lies (negative: in front of it), and the depth of `p`.
     /// `None` outside the image, under a hand or where there is no depth.
     pub(super) fn gap(&self, p: &Point) -> Option<(f64, f64)> {
-        let local = Point::from(self.camera_from_world * (p - self.eye));
-        let (u, v) = self.camera.project(&local).filter(|_| local.z > NEAREST_M)?;
-        let (x, y) = self.sketch.sample(u, v)?;
+        self.gap_at(&Point::from(self.camera_from_world * (p - self.eye)))
+    }
+
+    /// [`View::gap`] of a point in the camera frame.
+    pub(super) fn gap_at(&self, local: &Point) -> Option<(f64, f64)> {
+        let (x, y) = self.camera.project(local).filter(|_| local.z > NEAREST_M)?;
+        let (x, y) = self.sketch.nearest(x, y)?;
         let z = f64::from(self.sketch.depth.data[y * self.sketch.depth.width + x]) * self.factor;
         (z > 0.0).then_some((z - local.z, local.z))
     }
@@ -184,11 +188,12 @@ pub fn views<'a>(recording: &Recording, sketches: &'a BTreeMap<usize, Sketch>, f
         .iter()
         .filter_map(|&OpenFrame { frame, grip, hold }| {
             let world_from_camera = &recording.frames[frame].world_from_camera;
+            let sketch = sketches.get(&frame)?;
             Some(View {
                 camera_from_world: turn(world_from_camera),
                 eye: Point::from(world_from_camera.translation.vector),
-                camera: recording.camera,
-                sketch: sketches.get(&frame)?,
+                camera: sketch.camera(&recording.camera),
+                sketch,
                 factor: recording.depth_factor(frame),
                 grip,
                 hold,
@@ -275,7 +280,7 @@ pub(super) mod drawn {
         View {
             camera_from_world: turn(world_from_camera),
             eye: Point::from(world_from_camera.translation.vector),
-            camera: camera(),
+            camera: sketch.camera(&camera()),
             sketch,
             factor: 1.0,
             grip,

@@ -8,13 +8,15 @@
 
 use std::cmp::Ordering;
 
+use nalgebra::Matrix3;
+
 use super::Face;
 use super::face::Rect;
 use super::moved::{Hold, View, tolerance};
 use super::outline::SMALLEST;
 use super::rays::Rays;
 use crate::articulation::{Articulation, JointKind};
-use crate::math::Point;
+use crate::math::{Point, Vector};
 
 /// What the two readings count in the pool: of (1, 0), (0.75, 0.5) and (0.5, 1) the pair that explains the development seeds of
 /// four tiers best.
@@ -175,9 +177,30 @@ pub struct Sights<'a> {
     face: &'a Face,
     bounds: [[f64; 2]; 2],
     views: &'a [View<'a>],
-    points: Vec<Point>,
+    /// (right, up) of the part's points on the face.
+    points: Vec<[f64; 2]>,
     /// For each view and point [`View::gap`].
     closed: Vec<Vec<Option<(f64, f64)>>>,
+}
+
+/// What is linear on a face: a place, or its image in some frame.
+struct Linear {
+    /// At the face's centre.
+    center: Vector,
+    /// Per metre to the right and up.
+    right: Vector,
+    up: Vector,
+}
+
+impl Linear {
+    /// Of the face's points, moved by `turn` and then `way`.
+    fn of(face: &Face, turn: &Matrix3<f64>, way: &Vector) -> Self {
+        Self { center: turn * face.center.coords + way, right: turn * face.right, up: turn * face.up }
+    }
+
+    fn at(&self, [right, up]: [f64; 2]) -> Vector {
+        self.center + self.right * right + self.up * up
+    }
 }
 
 impl<'a> Sights<'a> {
@@ -186,9 +209,10 @@ impl<'a> Sights<'a> {
     pub fn of(face: &'a Face, rect: Option<&Rect>, views: &'a [View<'a>]) -> Self {
         let bounds = rect.unwrap_or(&SMALLEST).bounds;
         let at = |k: usize, b: [f64; 2]| b[0] + (b[1] - b[0]) * (k as f64 + 0.5) / GRID as f64;
-        let points: Vec<Point> =
-            (0..GRID * GRID).map(|i| face.point(at(i % GRID, bounds[0]), at(i / GRID, bounds[1]), 0.0)).collect();
-        let closed = views.iter().map(|view| points.iter().map(|p| view.gap(p)).collect()).collect();
+        let points: Vec<[f64; 2]> =
+            (0..GRID * GRID).map(|i| [at(i % GRID, bounds[0]), at(i / GRID, bounds[1])]).collect();
+        let gap = |view: &View, [right, up]: [f64; 2]| view.gap(&face.point(right, up, 0.0));
+        let closed = views.iter().map(|view| points.iter().map(|p| gap(view, *p)).collect()).collect();
         Self { rays: Rays::of(face, rect, views), face, bounds, views, points, closed }
     }
 }
@@ -202,24 +226,30 @@ pub(super) fn seen_share(
     offset: f64,
 ) -> (f64, usize) {
     let Sights { face, bounds, .. } = sights;
+    let face_from_world = Matrix3::from_rows(&[face.right, face.up, face.normal].map(|axis| axis.transpose()));
     let (mut explained, mut count) = (0usize, 0usize);
     for (view, closed) in sights.views.iter().zip(&sights.closed).filter(|(v, _)| holds.contains(&v.hold)) {
         let motion = joint.motion(joint.opening_at(grip, &view.grip) + offset);
         let (turn, way) = (motion.rotation.to_rotation_matrix().into_inner(), motion.translation.vector);
-        let turn_back = turn.transpose();
+        // Everything that is asked of a point is linear on the face: where it goes, in the camera's frame and in the face's,
+        // and which point of the face's frame goes where it was.
+        let seen = &view.camera_from_world;
+        let goes = Linear::of(face, &(seen * turn), &(seen * (way - view.eye.coords)));
+        let travels = Linear::of(face, &(turn - Matrix3::identity()), &way);
+        let back = face_from_world * turn.transpose();
+        let comes = Linear::of(face, &back, &-(back * way + face_from_world * face.center.coords));
         for (here, closed) in sights.points.iter().zip(closed) {
-            let moved = Point::from(turn * here.coords + way);
-            let travel = (moved - here).norm_squared();
-            let moves = |z: f64| travel >= (2.0 * tolerance(z)).powi(2);
+            let travel = travels.at(*here);
+            let moves = |z: f64| travel.norm_squared() >= (2.0 * tolerance(z)).powi(2);
             // Less than twice the least tolerance is no motion anywhere.
             if !moves(0.0) {
                 continue;
             }
             // Where it goes. Within the face there is a surface whether the part slid there or not.
-            if let Some((gap, z)) = view.gap(&moved)
+            if let Some((gap, z)) = view.gap_at(&Point::from(goes.at(*here)))
                 && moves(z)
                 && gap >= -tolerance(z)
-                && (moved - face.center).dot(&face.normal).abs() > tolerance(z)
+                && travel.dot(&face.normal).abs() > tolerance(z)
             {
                 count += 1;
                 explained += usize::from(gap <= tolerance(z));
@@ -229,7 +259,7 @@ pub(super) fn seen_share(
                 && moves(z)
                 && gap >= -tolerance(z)
             {
-                let [right, up, out] = face.coordinates(&Point::from(turn_back * (here.coords - way)));
+                let [right, up, out]: [f64; 3] = comes.at(*here).into();
                 let within = |x: f64, b: [f64; 2]| (b[0]..=b[1]).contains(&x);
                 let covered = out.abs() <= tolerance(z) && within(right, bounds[0]) && within(up, bounds[1]);
                 if !covered {
@@ -246,8 +276,6 @@ pub(super) fn seen_share(
 mod tests {
     use super::super::moved::drawn;
     use super::*;
-    use crate::articulation::JointKind;
-    use crate::math::Vector;
 
     const GRIP_STD_M: f64 = 0.03;
 

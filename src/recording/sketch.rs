@@ -57,9 +57,29 @@ impl Sketch {
     /// Sample nearest to a pixel of the full image; `None` outside.
     #[must_use]
     pub fn sample(&self, u: f64, v: f64) -> Option<(usize, usize)> {
+        let at = |c: f64| (c - (self.step / 2) as f64) / self.step as f64;
+        self.nearest(at(u), at(v))
+    }
+
+    /// A camera whose pixels are the samples, of the full image's.
+    #[must_use]
+    pub fn camera(&self, full: &Camera) -> Camera {
+        let (step, first) = (self.step as f64, (self.step / 2) as f64);
+        Camera {
+            width: self.depth.width,
+            height: self.depth.height,
+            fx: full.fx / step,
+            fy: full.fy / step,
+            cx: (full.cx - first) / step,
+            cy: (full.cy - first) / step,
+        }
+    }
+
+    /// Sample nearest to a pixel of [`Sketch::camera`]; `None` outside.
+    #[must_use]
+    pub fn nearest(&self, x: f64, y: f64) -> Option<(usize, usize)> {
         // Rounded by hand: half a sample outside is outside, and what is left is positive.
-        let at = |c: f64| (c - (self.step / 2) as f64) / self.step as f64 + 0.5;
-        let (x, y) = (at(u), at(v));
+        let (x, y) = (x + 0.5, y + 0.5);
         (x >= 0.0 && y >= 0.0)
             .then_some((x as usize, y as usize))
             .filter(|(x, y)| *x < self.depth.width && *y < self.depth.height)
@@ -117,6 +137,7 @@ mod tests {
         assert!((normal.dot(&p.coords) + 2.0).abs() < 1e-5);
         let (u, v) = sketch.pixel(10, 20);
         assert_eq!(sketch.sample(u, v), Some((10, 20)));
+        assert!((sketch.camera(&camera).unproject(10.0, 20.0, p.z) - p).norm() < 1e-12);
         assert!((sketch.normal(&camera, 10, 20, 3).unwrap() - normal).norm() < 1e-4);
         assert!(sketch.normal(&camera, 1, 20, 3).is_none());
     }
