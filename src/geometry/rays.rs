@@ -44,14 +44,14 @@ struct Ray {
     front: f64,
     /// Probability that the front is the part there.
     part: f64,
-    /// Likelihood of the depth if nothing moved, 1/m.
-    still: f64,
-    /// Likelihood of the depth if the part left its place, 1/m.
+    /// One over the likelihood (1/m) of the depth if nothing moved, metres.
+    by_still: f64,
+    /// Likelihood of the depth if the part left its place, against that if nothing moved.
     left: f64,
 }
 
 impl Ray {
-    /// Likelihood of its depth if the part moved against that of [`Ray::still`]. `way` and `eye`: its own, moved back with the
+    /// Likelihood of its depth if the part moved against that if nothing did. `way` and `eye`: its own, moved back with the
     /// part, so that the leaf is where it was when closed. `drawer`: whether a tray follows the leaf.
     fn ratio(&self, way: &Vector, eye: &Vector, outline: Option<&Rect>, drawer: bool) -> f64 {
         let leaf = -eye.z / way.z;
@@ -65,18 +65,19 @@ impl Ray {
         }
         let left = match self.part {
             0.0 => 0.0,
-            part if drawer && leaf > 0.0 && leaf < self.front => part * tray(self.depth, leaf, self.front),
+            part if drawer && leaf > 0.0 && leaf < self.front => {
+                part * tray(self.depth, leaf, self.front) * self.by_still
+            }
             part => part * self.left,
         };
-        let stays = (1.0 - self.part) * self.still;
-        let met = if on_leaf > 0.0 { on_leaf * surface(self.depth, leaf) } else { 0.0 };
+        let stays = 1.0 - self.part;
+        let met = if on_leaf > 0.0 { on_leaf * surface(self.depth, leaf) * self.by_still } else { 0.0 };
         // Behind the front a leaf is seen through its own hole.
-        let likelihood = if leaf <= self.front + 1e-9 {
+        if leaf <= self.front + 1e-9 {
             met + (1.0 - on_leaf) * (left + stays)
         } else {
             stays + self.part * met + (1.0 - on_leaf) * left
-        };
-        likelihood / self.still
+        }
     }
 }
 
@@ -104,8 +105,8 @@ pub(super) struct Rays {
 
 /// Probability that the part reaches a point of its front: inside its outline, or near the grip where there is none.
 fn membership(outline: Option<&Rect>, right: f64, up: f64) -> f64 {
-    /// An outline is a few cells off: from inside to outside over this far, metres.
-    const RIM_M: f64 = 0.12;
+    /// An outline is a few cells off: from inside to outside over 12 cm; 1/m.
+    const PER_RIM: f64 = 1.0 / 0.12;
     /// A part reaches this far from its handle, in the mean of all directions of all sorts of fronts, metres.
     const MEAN_REACH_M: f64 = 0.12;
     ON_PART
@@ -113,7 +114,7 @@ fn membership(outline: Option<&Rect>, right: f64, up: f64) -> f64 {
             Some(rect) => {
                 let within = |x: f64, b: [f64; 2]| (x - b[0]).min(b[1] - x);
                 let inside = within(right, rect.bounds[0]).min(within(up, rect.bounds[1]));
-                (0.5 + inside / RIM_M).clamp(0.0, 1.0)
+                (0.5 + inside * PER_RIM).clamp(0.0, 1.0)
             }
             None => (-right.hypot(up) / MEAN_REACH_M).exp(),
         }
@@ -121,10 +122,10 @@ fn membership(outline: Option<&Rect>, right: f64, up: f64) -> f64 {
 
 /// Likelihood (1/m) of a depth where a surface is expected.
 fn surface(depth: f64, expected: f64) -> f64 {
-    // A top as flat as the tolerance is wide; the integral of 1 / (1 + x^4) is pi over the root of two.
-    let x = (depth - expected) / tolerance(expected);
-    let area = std::f64::consts::PI / std::f64::consts::SQRT_2 * tolerance(expected);
-    let hit = (1.0 - BEFORE - BEHIND) / (area * (1.0 + x.powi(4)));
+    /// The integral of 1 / (1 + x^4): a top as flat as the tolerance is wide.
+    const AREA: f64 = std::f64::consts::PI / std::f64::consts::SQRT_2;
+    let flat = tolerance(expected);
+    let hit = (1.0 - BEFORE - BEHIND) / AREA * flat.powi(3) / (flat.powi(4) + (depth - expected).powi(4));
     hit + if depth < expected { BEFORE / expected } else { BEHIND / ROOM_M }
 }
 
@@ -186,8 +187,8 @@ impl Rays {
                         let front = -eye.z / way.z;
                         let grazing = GRAZING * way.norm();
                         if way.z.abs() < grazing || front < NEAREST_M {
-                            let (front, still) = (f64::INFINITY, 1.0 / ROOM_M);
-                            return Ray { way, grazing, depth, front, part: 0.0, still, left: 0.0 };
+                            let front = f64::INFINITY;
+                            return Ray { way, grazing, depth, front, part: 0.0, by_still: ROOM_M, left: 0.0 };
                         }
                         let at = eye + way * front;
                         let part = membership(outline, at.x, at.y);
@@ -195,8 +196,8 @@ impl Rays {
                         let seen = within(at.x, face.extent[0]) && within(at.y, face.extent[1]);
                         let filled = FILLED * if seen { 1.0 } else { part };
                         let left = opened(depth, front);
-                        let still = filled * surface(depth, front) + (1.0 - filled) * left;
-                        Ray { way, grazing, depth, front, part, still, left }
+                        let by_still = 1.0 / (filled * surface(depth, front) + (1.0 - filled) * left);
+                        Ray { way, grazing, depth, front, part, by_still, left: left * by_still }
                     })
                     .collect();
                 ViewRays { hold: view.hold, grip: view.grip, eye, rays }

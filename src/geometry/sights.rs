@@ -24,9 +24,11 @@ const POINTS_WEIGHT: f64 = 0.75;
 const RAYS_WEIGHT: f64 = 0.5;
 /// The rays' word before it is pooled, at most, nats: where an outline is wrong they are all wrong together.
 const MOST_NATS: f64 = 10.0;
-/// Between two offsets, metres, at least: what the depth's tolerance bridges. The rays' offsets are half a standard deviation
-/// apart where that is more.
-const STEP_M: f64 = 0.02;
+/// Offsets go so many standard deviations to each side.
+const REACH: f64 = 2.0;
+/// Between two offsets, metres, at least: what the depth's tolerance bridges. They are half a standard deviation apart where
+/// that is more.
+const STEP_M: f64 = 0.03;
 
 /// Views whose offsets are one when joints are judged: what lets a wrong joint choose freely tells less.
 const TOGETHER: [&[Hold]; 3] = [&[Hold::Sure, Hold::Free], &[Hold::Lost], &[Hold::Left]];
@@ -92,14 +94,11 @@ fn spread_m(together: &[Hold], views: &[View], grip_std_m: f64) -> f64 {
 
 /// The rays' word: all offsets count, each as far as it is believed in.
 fn by_rays(sights: &Sights, joint: &Articulation, grip: &Point, grip_std_m: f64) -> f64 {
-    /// Offsets to each side, in standard deviations and at the most in number.
-    const REACH: f64 = 2.5;
-    const STEPS: f64 = 5.0;
     let lever = joint.lever(grip).max(LEAST_LEVER_M);
     // Where a hand was lost before it let go, the views after that have an offset of their own.
     let of = |holds: &[Hold]| -> f64 {
         let std_m = spread_m(holds, sights.views, grip_std_m);
-        let step = STEP_M.max(REACH * std_m / STEPS);
+        let step = STEP_M.max(0.5 * std_m);
         let reach = (REACH * std_m / step).round() as i32;
         let terms: Vec<(f64, f64)> = (-reach..=reach)
             .map(|k| {
@@ -137,16 +136,16 @@ fn by_points(sights: &Sights, joint: &Articulation, grip: &Point, grip_std_m: f6
             let order = (found.1 >= LEAST_SIGHTS, found.0).partial_cmp(&(best.1.1 >= LEAST_SIGHTS, best.1.0));
             if order == Some(Ordering::Greater) { (offset, found) } else { best }
         };
-        // Two standard deviations to each side, from the middle outwards: far reaches by double steps first.
-        let stride = if std_m > 2.0 * STEP_M { 2.0 * STEP_M } else { STEP_M };
-        let reach = (2.0 * std_m / stride).round() as i32;
+        // From the middle outwards; wide steps are halved about the best.
+        let step = STEP_M.max(0.5 * std_m);
+        let reach = (REACH * std_m / step).round() as i32;
         let mut best = (0.0, at(0.0));
         for k in 1..=reach {
-            best = better(better(best, -f64::from(k) * stride), f64::from(k) * stride);
+            best = better(better(best, -f64::from(k) * step), f64::from(k) * step);
         }
-        if stride > STEP_M {
+        if step > STEP_M {
             let middle = best.0;
-            best = better(better(best, middle - STEP_M), middle + STEP_M);
+            best = better(better(best, middle - 0.5 * step), middle + 0.5 * step);
         }
         best.1
     };
