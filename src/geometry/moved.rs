@@ -77,9 +77,11 @@ impl View<'_> {
     /// one.
     pub(super) fn each_depth(&self, mut take: impl FnMut(Vector, f64)) {
         let grid = &self.sketch.depth;
+        let columns: Vec<f64> = (0..grid.width).map(|x| self.camera.unproject(x as f64, 0.0, 1.0).x).collect();
         for (y, row) in grid.data.chunks_exact(grid.width.max(1)).enumerate() {
-            for (x, z) in row.iter().enumerate().filter(|(_, z)| **z > 0.0) {
-                take(self.camera.unproject(x as f64, y as f64, 1.0).coords, f64::from(*z) * self.factor);
+            let y = self.camera.unproject(0.0, y as f64, 1.0).y;
+            for (&x, &z) in columns.iter().zip(row).filter(|(_, z)| **z > 0.0) {
+                take(Vector::new(x, y, 1.0), f64::from(z) * self.factor);
             }
         }
     }

@@ -31,13 +31,9 @@ const BLOCKED: f64 = 0.1;
 /// Over this far behind a surface a depth may lie anywhere, metres: a kitchen's width.
 const ROOM_M: f64 = 4.0;
 
-/// A ray of a view.
+/// What a ray of a view saw.
 #[derive(Debug, Clone, Copy)]
 struct Ray {
-    /// Way per metre of depth, face coordinates (right, up, out).
-    way: Vector,
-    /// Slope of `way` against a leaf, below which the leaf is seen edge-on.
-    grazing: f64,
     /// Depth seen, metres.
     depth: f64,
     /// Depth at which the ray meets the closed front; infinite where it does not.
@@ -51,15 +47,9 @@ struct Ray {
 }
 
 impl Ray {
-    /// Likelihood of its depth if the part moved against that if nothing did. `way` and `eye`: its own, moved back with the
-    /// part, so that the leaf is where it was when closed. `drawer`: whether a tray follows the leaf.
-    fn ratio(&self, way: &Vector, eye: &Vector, outline: Option<&Rect>, drawer: bool) -> f64 {
-        let leaf = -eye.z / way.z;
-        let on_leaf = if leaf > NEAREST_M && way.z.abs() > self.grazing {
-            membership(outline, eye.x + way.x * leaf, eye.y + way.y * leaf)
-        } else {
-            0.0
-        };
+    /// Likelihood of its depth if the part moved against that if nothing did. `leaf`: the depth at which the ray meets the
+    /// leaf's plane, `on_leaf`: probability that it meets the leaf there. `drawer`: whether a tray follows the leaf.
+    fn ratio(&self, leaf: f64, on_leaf: f64, drawer: bool) -> f64 {
         if on_leaf <= 0.0 && self.part <= 0.0 {
             return 1.0;
         }
@@ -81,6 +71,55 @@ impl Ray {
     }
 }
 
+/// Rays that are worked on at once.
+const AT_ONCE: usize = 16;
+
+/// Rays of a view. Where they meet a leaf is worked out for all of them, step by step, which processors do several at a time.
+#[derive(Debug, Clone)]
+struct Batch {
+    /// Ways per metre of depth, face coordinates (right, up, out); zero beyond the last ray.
+    ways: [[f64; AT_ONCE]; 3],
+    /// Slopes of the ways against a leaf, below which the leaf is seen edge-on.
+    grazing: [f64; AT_ONCE],
+    /// One to [`AT_ONCE`].
+    rays: Vec<Ray>,
+}
+
+impl Batch {
+    fn of(some: &[(Vector, Ray)]) -> Self {
+        let mut out = Self { ways: [[0.0; AT_ONCE]; 3], grazing: [0.0; AT_ONCE], rays: Vec::new() };
+        for (i, (way, ray)) in some.iter().enumerate() {
+            for k in 0..3 {
+                out.ways[k][i] = way[k];
+            }
+            out.grazing[i] = GRAZING * way.norm();
+            out.rays.push(*ray);
+        }
+        out
+    }
+
+    /// For each ray the depth at which it meets the leaf's plane, and the probability that it meets the leaf. The rays are
+    /// turned `back`, and start at the `eye` that was moved back with the part, so that the leaf is where it was when closed.
+    fn meets(&self, back: &Matrix3<f64>, eye: &Vector, outline: Option<&Rect>) -> ([f64; AT_ONCE], [f64; AT_ONCE]) {
+        let [right, up, out] = &self.ways;
+        let turned = |k: usize| -> [f64; AT_ONCE] {
+            let row = [back[(k, 0)], back[(k, 1)], back[(k, 2)]];
+            std::array::from_fn(|i| row[0] * right[i] + row[1] * up[i] + row[2] * out[i])
+        };
+        let [x, y, z] = [turned(0), turned(1), turned(2)];
+        let leaf: [f64; AT_ONCE] = std::array::from_fn(|i| -eye.z / z[i]);
+        let x: [f64; AT_ONCE] = std::array::from_fn(|i| eye.x + x[i] * leaf[i]);
+        let y: [f64; AT_ONCE] = std::array::from_fn(|i| eye.y + y[i] * leaf[i]);
+        let met: [f64; AT_ONCE] = match outline {
+            Some(rect) => std::array::from_fn(|i| within(rect, x[i], y[i])),
+            None => std::array::from_fn(|i| near_grip(x[i], y[i])),
+        };
+        let met =
+            std::array::from_fn(|i| if (leaf[i] > NEAREST_M) & (z[i].abs() > self.grazing[i]) { met[i] } else { 0.0 });
+        (leaf, met)
+    }
+}
+
 /// The rays of one view.
 #[derive(Debug, Clone)]
 struct ViewRays {
@@ -89,7 +128,7 @@ struct ViewRays {
     grip: Point,
     /// The eye in face coordinates.
     eye: Vector,
-    rays: Vec<Ray>,
+    batches: Vec<Batch>,
 }
 
 /// A face's part, closed, and the rays of the open views near it: the same for every joint that it could have.
@@ -105,19 +144,23 @@ pub(super) struct Rays {
 
 /// Probability that the part reaches a point of its front: inside its outline, or near the grip where there is none.
 fn membership(outline: Option<&Rect>, right: f64, up: f64) -> f64 {
+    outline.map_or_else(|| near_grip(right, up), |rect| within(rect, right, up))
+}
+
+fn within(rect: &Rect, right: f64, up: f64) -> f64 {
     /// An outline is a few cells off: from inside to outside over 12 cm; 1/m.
     const PER_RIM: f64 = 1.0 / 0.12;
+    let [[left, right_end], [low, high]] = rect.bounds;
+    let lesser = |a: f64, b: f64| if a < b { a } else { b };
+    let inside = lesser(lesser(right - left, right_end - right), lesser(up - low, high - up));
+    let share = lesser(0.5 + inside * PER_RIM, 1.0);
+    ON_PART * if share > 0.0 { share } else { 0.0 }
+}
+
+fn near_grip(right: f64, up: f64) -> f64 {
     /// A part reaches this far from its handle, in the mean of all directions of all sorts of fronts, metres.
     const MEAN_REACH_M: f64 = 0.12;
-    ON_PART
-        * match outline {
-            Some(rect) => {
-                let within = |x: f64, b: [f64; 2]| (x - b[0]).min(b[1] - x);
-                let inside = within(right, rect.bounds[0]).min(within(up, rect.bounds[1]));
-                (0.5 + inside * PER_RIM).clamp(0.0, 1.0)
-            }
-            None => (-right.hypot(up) / MEAN_REACH_M).exp(),
-        }
+    ON_PART * (-right.hypot(up) / MEAN_REACH_M).exp()
 }
 
 /// Likelihood (1/m) of a depth where a surface is expected.
@@ -163,7 +206,7 @@ impl Rays {
         let [right, up] = outline.map_or([0.0; 2], |r| r.bounds.map(|b| 0.5 * (b[0] + b[1])));
         let middle = Vector::new(right, up, 0.0);
         let reach = REACH_M + outline.map_or(UNKNOWN_M, |r| 0.5 * r.size()[0].hypot(r.size()[1]));
-        let within = |x: f64, b: [f64; 2]| (b[0]..=b[1]).contains(&x);
+        let between = |x: f64, b: [f64; 2]| (b[0]..=b[1]).contains(&x);
         let views: Vec<ViewRays> = views
             .iter()
             .map(|view| {
@@ -171,39 +214,45 @@ impl Rays {
                 let to = middle - eye;
                 let face_from_camera = face_from_world * view.world_from_camera();
                 let to_in_camera = face_from_camera.transpose() * to;
+                let beyond = to.norm_squared() - reach * reach;
                 let mut near: Vec<(Vector, f64)> = Vec::new();
                 view.each_depth(|way, depth| {
-                    let along = to_in_camera.dot(&way) / way.norm_squared();
-                    if along > 0.0 && (way * along - to_in_camera).norm_squared() < reach * reach {
+                    // Nearer than the reach: |to|² - (along / |way|)² < reach².
+                    let along = to_in_camera.dot(&way);
+                    if along > 0.0 && beyond * way.norm_squared() < along * along {
                         near.push((way, depth));
                     }
                 });
                 let step = near.len().div_ceil(RAYS).max(1);
-                let rays = near
+                let rays: Vec<(Vector, Ray)> = near
                     .into_iter()
                     .step_by(step)
                     .map(|(way, depth)| {
                         let way = face_from_camera * way;
                         let front = -eye.z / way.z;
-                        let grazing = GRAZING * way.norm();
-                        if way.z.abs() < grazing || front < NEAREST_M {
+                        if way.z.abs() < GRAZING * way.norm() || front < NEAREST_M {
                             let front = f64::INFINITY;
-                            return Ray { way, grazing, depth, front, part: 0.0, by_still: ROOM_M, left: 0.0 };
+                            return (way, Ray { depth, front, part: 0.0, by_still: ROOM_M, left: 0.0 });
                         }
                         let at = eye + way * front;
                         let part = membership(outline, at.x, at.y);
                         // Of what lies beside the front nothing is known.
-                        let seen = within(at.x, face.extent[0]) && within(at.y, face.extent[1]);
+                        let seen = between(at.x, face.extent[0]) && between(at.y, face.extent[1]);
                         let filled = FILLED * if seen { 1.0 } else { part };
                         let left = opened(depth, front);
                         let by_still = 1.0 / (filled * surface(depth, front) + (1.0 - filled) * left);
-                        Ray { way, grazing, depth, front, part, by_still, left: left * by_still }
+                        (way, Ray { depth, front, part, by_still, left: left * by_still })
                     })
                     .collect();
-                ViewRays { hold: view.hold, grip: view.grip, eye, rays }
+                ViewRays {
+                    hold: view.hold,
+                    grip: view.grip,
+                    eye,
+                    batches: rays.chunks(AT_ONCE).map(Batch::of).collect(),
+                }
             })
             .collect();
-        let on_part: f64 = views.iter().flat_map(|v| &v.rays).map(|r| r.part).sum();
+        let on_part: f64 = views.iter().flat_map(|v| &v.batches).flat_map(|b| &b.rays).map(|r| r.part).sum();
         let weight = (INDEPENDENT / on_part.max(1.0)).min(1.0);
         Self { face_from_world, center: face.center, outline: outline.copied(), views, weight }
     }
@@ -216,8 +265,6 @@ impl Rays {
     /// Log likelihood of the views of one sort under a joint, against that nothing moved, in nats. `offset` (rad or m) is
     /// added to the opening that the hand tells.
     pub(super) fn log_likelihood(&self, joint: &Articulation, grip: &Point, holds: &[Hold], offset: f64) -> f64 {
-        /// Rays whose ratios are multiplied before one logarithm is taken: each is within 1e-4 and 1e4.
-        const AT_ONCE: usize = 16;
         let axis = self.face_from_world * joint.axis;
         let origin = self.face_from_world * (joint.origin - self.center);
         let mut sum = 0.0;
@@ -234,8 +281,11 @@ impl Rays {
             // Out of the front within 26 degrees, as fitting tells drawers from sliding doors.
             let drawer = joint.kind == JointKind::Prismatic && axis.z > 0.9 && opening > 0.0;
             let outline = self.outline.as_ref();
-            for some in view.rays.chunks(AT_ONCE) {
-                let ratios = some.iter().map(|ray| ray.ratio(&(back * ray.way), &eye, outline, drawer));
+            for batch in &view.batches {
+                let (leaf, on_leaf) = batch.meets(&back, &eye, outline);
+                let ratios = batch.rays.iter().zip(leaf.into_iter().zip(on_leaf));
+                let ratios = ratios.map(|(ray, (leaf, on_leaf))| ray.ratio(leaf, on_leaf, drawer));
+                // One logarithm for all: each ratio is within 1e-4 and 1e4.
                 sum += ratios.product::<f64>().ln();
             }
         }
