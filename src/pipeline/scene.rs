@@ -290,10 +290,14 @@ fn judged(group: &Group, reasoner: &dyn Reasoner, outlines: &[Rect]) -> Option<J
     // The clip that saw the closed part best gives the face, the grip and the part's outline.
     let trust = |c: usize| -> f64 {
         let clip = &clips[c];
-        let (Some(face), Some(region)) = (&clip.face, &clip.region) else { return 0.0 };
+        let (Some(face), Some(region), Some(trajectory)) = (&clip.face, &clip.region, &clip.trajectory) else {
+            return 0.0;
+        };
         let standoff = face.coordinates(&region.grip)[2];
         let held = (-0.5 * ((standoff - config.geometry.grip_standoff_m) / 0.05).powi(2)).exp();
-        held * (0.2 + face.support) * if clip.part.is_some() { 2.0 } else { 1.0 }
+        // A hand that was lost on its way from or to the closed place is near the front of whatever it was lost at.
+        let near = 1.0 / hands::grip_std_m(trajectory.closed_end_seen());
+        held * near * (0.2 + face.support) * if clip.part.is_some() { 2.0 } else { 1.0 }
     };
     let &best = members
         .iter()
