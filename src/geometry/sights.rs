@@ -16,6 +16,7 @@ use super::moved::{Hold, View, tolerance};
 use super::outline::SMALLEST;
 use super::rays::Rays;
 use crate::articulation::{Articulation, JointKind};
+use crate::math::stats::log_sum;
 use crate::math::{Point, Vector};
 
 /// What the two readings count in the pool: of (1, 0), (0.75, 0.5) and (0.5, 1) the pair that explains the development seeds of
@@ -85,11 +86,16 @@ fn all_but_same(a: &Articulation, b: &Articulation) -> bool {
         && (a.kind == JointKind::Prismatic || b.line().distance(&a.origin) < OFFSET_M)
 }
 
-/// Spread of the offset that views of these sorts share, metres: that of the surest sort that there is. Views after a hand let
-/// go are held to the offset of those before.
-fn spread_m(together: &[Hold], views: &[View], grip_std_m: f64) -> f64 {
+/// Offsets of the opening at the grip that views of these sorts may share, metres, from the middle outwards, each with the log of
+/// how far it is believed in against none. Their spread is that of the surest sort that there is: views after a hand let go
+/// are held to the offset of those before.
+fn offsets(together: &[Hold], views: &[View], grip_std_m: f64) -> Vec<(f64, f64)> {
     let of = |h: &Hold| views.iter().any(|v| v.hold == *h).then(|| h.std_m(grip_std_m));
-    together.iter().filter_map(of).fold(f64::INFINITY, f64::min)
+    let std_m = together.iter().filter_map(of).fold(f64::INFINITY, f64::min);
+    let step = STEP_M.max(0.5 * std_m);
+    let reach = (REACH * std_m / step).round() as i32;
+    let steps = std::iter::once(0).chain((1..=reach).flat_map(|k| [-k, k]));
+    steps.map(|k| f64::from(k) * step).map(|offset| (offset, -0.5 * (offset / std_m).powi(2))).collect()
 }
 
 /// The rays' word: all offsets count, each as far as it is believed in.
@@ -97,19 +103,11 @@ fn by_rays(sights: &Sights, joint: &Articulation, grip: &Point, grip_std_m: f64)
     let lever = joint.lever(grip).max(LEAST_LEVER_M);
     // Where a hand was lost before it let go, the views after that have an offset of their own.
     let of = |holds: &[Hold]| -> f64 {
-        let std_m = spread_m(holds, sights.views, grip_std_m);
-        let step = STEP_M.max(0.5 * std_m);
-        let reach = (REACH * std_m / step).round() as i32;
-        let terms: Vec<(f64, f64)> = (-reach..=reach)
-            .map(|k| {
-                let offset = f64::from(k) * step;
-                let prior = (-0.5 * (offset / std_m).powi(2)).exp();
-                (prior, sights.rays.log_likelihood(joint, grip, holds, offset / lever))
-            })
-            .collect();
-        let top = terms.iter().map(|(_, l)| *l).fold(f64::NEG_INFINITY, f64::max);
-        let believed: f64 = terms.iter().map(|(prior, _)| prior).sum();
-        top + (terms.iter().map(|(prior, l)| prior * (l - top).exp()).sum::<f64>() / believed).ln()
+        let (priors, together): (Vec<f64>, Vec<f64>) = offsets(holds, sights.views, grip_std_m)
+            .into_iter()
+            .map(|(offset, prior)| (prior, prior + sights.rays.log_likelihood(joint, grip, holds, offset / lever)))
+            .unzip();
+        log_sum(&together) - log_sum(&priors)
     };
     let total: f64 = TOGETHER.into_iter().filter(|holds| sights.rays.has(holds)).map(of).sum();
     MOST_NATS * (total / MOST_NATS).tanh()
@@ -120,34 +118,20 @@ fn by_rays(sights: &Sights, joint: &Articulation, grip: &Point, grip_std_m: f64)
 ///
 /// Of all offsets (see [`agreement`]) the one that explains most is taken, less what so large an offset is believed in.
 fn by_points(sights: &Sights, joint: &Articulation, grip: &Point, grip_std_m: f64) -> (f64, usize) {
-    /// Half a squared standard deviation against what the whole share is worth in [`log_likelihood`].
+    /// A nat against what the whole share is worth in [`log_likelihood`].
     const SHARE_PER_NAT: f64 = 1.0 / 18.0;
     let lever = joint.lever(grip).max(LEAST_LEVER_M);
     // Where a hand was lost before it let go, the views after that have an offset of their own.
     let of = |holds: &[Hold]| -> (f64, usize) {
-        let std_m = spread_m(holds, sights.views, grip_std_m);
-        let at = |offset: f64| -> (f64, usize) {
+        let found = offsets(holds, sights.views, grip_std_m).into_iter().map(|(offset, prior)| {
             let (share, count) = seen_share(sights, joint, grip, holds, offset / lever);
-            ((share - SHARE_PER_NAT * 0.5 * (offset / std_m).powi(2)).max(0.0), count)
-        };
+            ((share + SHARE_PER_NAT * prior).max(0.0), count)
+        });
         // An offset under which nothing moves clearly explains nothing; of equal offsets the first is kept.
-        let better = |best: (f64, (f64, usize)), offset: f64| -> (f64, (f64, usize)) {
-            let found = at(offset);
-            let order = (found.1 >= LEAST_SIGHTS, found.0).partial_cmp(&(best.1.1 >= LEAST_SIGHTS, best.1.0));
-            if order == Some(Ordering::Greater) { (offset, found) } else { best }
+        let better = |next: &(f64, usize), best: &(f64, usize)| {
+            (next.1 >= LEAST_SIGHTS, next.0).partial_cmp(&(best.1 >= LEAST_SIGHTS, best.0)) == Some(Ordering::Greater)
         };
-        // From the middle outwards; wide steps are halved about the best.
-        let step = STEP_M.max(0.5 * std_m);
-        let reach = (REACH * std_m / step).round() as i32;
-        let mut best = (0.0, at(0.0));
-        for k in 1..=reach {
-            best = better(better(best, -f64::from(k) * step), f64::from(k) * step);
-        }
-        if step > STEP_M {
-            let middle = best.0;
-            best = better(better(best, middle - 0.5 * step), middle + 0.5 * step);
-        }
-        best.1
+        found.reduce(|best, next| if better(&next, &best) { next } else { best }).unwrap_or((0.0, 0))
     };
     let (mut explained, mut count) = (0.0, 0);
     for holds in TOGETHER.iter().filter(|holds| sights.views.iter().any(|v| holds.contains(&v.hold))) {

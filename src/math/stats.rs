@@ -46,6 +46,13 @@ pub fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
+/// `ln sum exp`, minus infinity for nothing.
+#[must_use]
+pub fn log_sum(values: &[f64]) -> f64 {
+    let top = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if top == f64::NEG_INFINITY { top } else { top + values.iter().map(|v| (v - top).exp()).sum::<f64>().ln() }
+}
+
 /// Angles made continuous: each one moved by full turns to lie within half a turn of the one before.
 #[must_use]
 pub fn unwrap_angles(angles: &[f64]) -> Vec<f64> {

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::articulation::JointKind;
 use crate::error::Result;
 use crate::geometry::{AxisCandidate, Face};
-use crate::math::{Point, Vector};
+use crate::math::{Point, Vector, stats};
 use crate::recording::narration::Reading;
 
 /// What is known when the questions are asked.
@@ -82,7 +82,7 @@ impl Answer {
         let mass = |kind: JointKind| {
             let of_kind: Vec<f64> =
                 candidates.iter().zip(&weights).filter(|(c, _)| c.joint.kind == kind).map(|(_, w)| *w).collect();
-            log_sum(&of_kind)
+            stats::log_sum(&of_kind)
         };
         let odds = mass(JointKind::Revolute) - mass(JointKind::Prismatic) + self.words_log_odds;
         // Neither type has a candidate: nothing is known.
@@ -104,12 +104,6 @@ impl Answer {
             words_log_odds: answers.iter().map(|a| a.words_log_odds).sum::<f64>() / count,
         })
     }
-}
-
-/// `ln sum exp`, minus infinity for nothing.
-fn log_sum(values: &[f64]) -> f64 {
-    let top = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if top == f64::NEG_INFINITY { top } else { top + values.iter().map(|v| (v - top).exp()).sum::<f64>().ln() }
 }
 
 /// Whoever answers.
