@@ -12,7 +12,7 @@ use nalgebra::Matrix3;
 
 use super::Face;
 use super::face::Rect;
-use super::moved::{Hold, View, tolerance};
+use super::moved::{GRAZING, Hold, View, tolerance};
 use super::outline::SMALLEST;
 use super::rays::Rays;
 use crate::articulation::{Articulation, JointKind};
@@ -217,6 +217,7 @@ pub(super) fn seen_share(
         // Everything that is asked of a point is linear on the face: where it goes, in the camera's frame and in the face's,
         // and which point of the face's frame goes where it was.
         let seen = &view.camera_from_world;
+        let facing = seen * turn * face.normal;
         let goes = Linear::of(face, &(seen * turn), &(seen * (way - view.eye.coords)));
         let travels = Linear::of(face, &(turn - Matrix3::identity()), &way);
         let back = face_from_world * turn.transpose();
@@ -229,7 +230,9 @@ pub(super) fn seen_share(
                 continue;
             }
             // Where it goes. Within the face there is a surface whether the part slid there or not.
-            if let Some((gap, z)) = view.gap_at(&Point::from(goes.at(*here)))
+            let there = goes.at(*here);
+            if facing.dot(&there).powi(2) > GRAZING * GRAZING * there.norm_squared()
+                && let Some((gap, z)) = view.gap_at(&Point::from(there))
                 && moves(z)
                 && gap >= -tolerance(z)
                 && travel.dot(&face.normal).abs() > tolerance(z)
