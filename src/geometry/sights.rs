@@ -309,6 +309,26 @@ mod tests {
     }
 
     #[test]
+    fn a_leaf_seen_edge_on_tells_nothing_about_where_it_is() {
+        // The eye lies in the plane of the leaf at this opening; a hand that is off by a few degrees puts it elsewhere.
+        let pose = drawn::pose(Point::new(0.3, -1.0, 0.5));
+        let edge_on = 1.0f64.atan2(0.55);
+        let (face, grip, rect) = (drawn::face(), drawn::face().center, drawn::rect());
+        let sketch = drawn::sketch(&pose, &door(), edge_on);
+        let told = |opening: f64| {
+            let views = [drawn::view(&sketch, &pose, door().motion(opening) * grip)];
+            by_points(&Sights::of(&face, Some(&rect), &views), &door(), &grip, 0.001)
+        };
+        let ((right, all), (off, rest)) = (told(edge_on), told(edge_on - 0.1));
+        assert!(right > 0.95 && off > 0.95, "{right} {off}");
+        // What it uncovered still speaks.
+        assert!(all >= LEAST_SIGHTS && rest >= LEAST_SIGHTS, "{all} {rest}");
+        // Turned on towards the eye it is seen, and is not there.
+        let (wrong, _) = told(edge_on - 0.5);
+        assert!(wrong < 0.8, "{wrong}");
+    }
+
+    #[test]
     fn rays_prefer_the_motion_that_was_made_with_and_without_an_outline() {
         let joints = [(door(), 0.9), (slide(-Vector::y()), 0.3), (slide(-Vector::x()), 0.3)];
         let rect = drawn::rect();
