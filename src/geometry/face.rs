@@ -36,6 +36,12 @@ impl Face {
         [d.dot(&self.right), d.dot(&self.up), d.dot(&self.normal)]
     }
 
+    /// Rotation from the world's axes to the face's (right, up, out).
+    #[must_use]
+    pub fn from_world(&self) -> nalgebra::Matrix3<f64> {
+        nalgebra::Matrix3::from_rows(&[self.right, self.up, self.normal].map(|axis| axis.transpose()))
+    }
+
     /// World point at face coordinates.
     #[must_use]
     pub fn point(&self, right: f64, up: f64, out: f64) -> Point {

@@ -110,6 +110,7 @@ impl Batch {
         let leaf: [f64; AT_ONCE] = std::array::from_fn(|i| -eye.z / z[i]);
         let x: [f64; AT_ONCE] = std::array::from_fn(|i| eye.x + x[i] * leaf[i]);
         let y: [f64; AT_ONCE] = std::array::from_fn(|i| eye.y + y[i] * leaf[i]);
+        // One choice for all: a choice for each would keep them apart.
         let met: [f64; AT_ONCE] = match outline {
             Some(rect) => std::array::from_fn(|i| within(rect, x[i], y[i])),
             None => std::array::from_fn(|i| near_grip(x[i], y[i])),
@@ -147,16 +148,19 @@ fn membership(outline: Option<&Rect>, right: f64, up: f64) -> f64 {
     outline.map_or_else(|| near_grip(right, up), |rect| within(rect, right, up))
 }
 
+/// [`membership`] of an outline.
 fn within(rect: &Rect, right: f64, up: f64) -> f64 {
     /// An outline is a few cells off: from inside to outside over 12 cm; 1/m.
     const PER_RIM: f64 = 1.0 / 0.12;
     let [[left, right_end], [low, high]] = rect.bounds;
+    // Without branches; what is not a number, as of rays that meet no leaf, may come out as anything.
     let lesser = |a: f64, b: f64| if a < b { a } else { b };
     let inside = lesser(lesser(right - left, right_end - right), lesser(up - low, high - up));
     let share = lesser(0.5 + inside * PER_RIM, 1.0);
     ON_PART * if share > 0.0 { share } else { 0.0 }
 }
 
+/// [`membership`] without one.
 fn near_grip(right: f64, up: f64) -> f64 {
     /// A part reaches this far from its handle, in the mean of all directions of all sorts of fronts, metres.
     const MEAN_REACH_M: f64 = 0.12;
@@ -202,7 +206,7 @@ impl Rays {
     pub(super) fn of(face: &Face, outline: Option<&Rect>, views: &[View]) -> Self {
         /// Half of what a part without an outline may measure across, metres.
         const UNKNOWN_M: f64 = 0.3;
-        let face_from_world = Matrix3::from_rows(&[face.right, face.up, face.normal].map(|axis| axis.transpose()));
+        let face_from_world = face.from_world();
         let [right, up] = outline.map_or([0.0; 2], |r| r.bounds.map(|b| 0.5 * (b[0] + b[1])));
         let middle = Vector::new(right, up, 0.0);
         let reach = REACH_M + outline.map_or(UNKNOWN_M, |r| 0.5 * r.size()[0].hypot(r.size()[1]));

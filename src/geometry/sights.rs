@@ -19,8 +19,8 @@ use crate::articulation::{Articulation, JointKind};
 use crate::math::stats::log_sum;
 use crate::math::{Point, Vector};
 
-/// What the two readings count in the pool: of (1, 0), (0.75, 0.5) and (0.5, 1) the pair that explains the development seeds of
-/// four tiers best.
+/// What the two readings count in the pool: of (1, 0), (0.75, 0.5) and (0.5, 1) the pair that explained the development seeds of
+/// four tiers best, with finer offsets than now.
 const POINTS_WEIGHT: f64 = 0.75;
 const RAYS_WEIGHT: f64 = 0.5;
 /// The rays' word before it is pooled, at most, nats: where an outline is wrong they are all wrong together.
@@ -28,7 +28,7 @@ const MOST_NATS: f64 = 10.0;
 /// Offsets go so many standard deviations to each side.
 const REACH: f64 = 2.0;
 /// Between two offsets, metres, at least: what the depth's tolerance bridges. They are half a standard deviation apart where
-/// that is more.
+/// that is more: finer ones cost twice as much and found no more joints.
 const STEP_M: f64 = 0.03;
 
 /// Views whose offsets are one when joints are judged: what lets a wrong joint choose freely tells less.
@@ -114,7 +114,7 @@ fn by_rays(sights: &Sights, joint: &Articulation, grip: &Point, grip_std_m: f64)
 }
 
 /// The points' word: of the face's points that a joint moves clearly, the share that is seen where it puts them rather than seen
-/// through there, and no longer where they were; and the number of such sights.
+/// through there (but edge-on), and no longer where they were; and the number of such sights.
 ///
 /// Of all offsets (see [`agreement`]) the one that explains most is taken, less what so large an offset is believed in.
 fn by_points(sights: &Sights, joint: &Articulation, grip: &Point, grip_std_m: f64) -> (f64, usize) {
@@ -166,7 +166,7 @@ pub struct Sights<'a> {
     closed: Vec<Vec<Option<(f64, f64)>>>,
 }
 
-/// What is linear on a face: a place, or its image in some frame.
+/// What changes evenly over a face: where its points go, seen from somewhere.
 struct Linear {
     /// At the face's centre.
     center: Vector,
@@ -209,16 +209,17 @@ pub(super) fn seen_share(
     offset: f64,
 ) -> (f64, usize) {
     let Sights { face, bounds, .. } = sights;
-    let face_from_world = Matrix3::from_rows(&[face.right, face.up, face.normal].map(|axis| axis.transpose()));
+    let face_from_world = face.from_world();
     let (mut explained, mut count) = (0usize, 0usize);
     for (view, closed) in sights.views.iter().zip(&sights.closed).filter(|(v, _)| holds.contains(&v.hold)) {
         let motion = joint.motion(joint.opening_at(grip, &view.grip) + offset);
         let (turn, way) = (motion.rotation.to_rotation_matrix().into_inner(), motion.translation.vector);
-        // Everything that is asked of a point is linear on the face: where it goes, in the camera's frame and in the face's,
-        // and which point of the face's frame goes where it was.
+        // What is asked of a point changes evenly over the face: where it goes in the camera's frame, how far it goes in the
+        // world's, and which point of the face's frame comes to where it was.
         let seen = &view.camera_from_world;
-        let facing = seen * turn * face.normal;
-        let goes = Linear::of(face, &(seen * turn), &(seen * (way - view.eye.coords)));
+        let turned = seen * turn;
+        let facing = turned * face.normal;
+        let goes = Linear::of(face, &turned, &(seen * (way - view.eye.coords)));
         let travels = Linear::of(face, &(turn - Matrix3::identity()), &way);
         let back = face_from_world * turn.transpose();
         let comes = Linear::of(face, &back, &-(back * way + face_from_world * face.center.coords));
@@ -229,7 +230,8 @@ pub(super) fn seen_share(
             if !moves(0.0) {
                 continue;
             }
-            // Where it goes. Within the face there is a surface whether the part slid there or not.
+            // Where it goes. Within the face there is a surface whether the part slid there or not, and edge-on a small error
+            // of the opening is a large one of the depth: both tell nothing.
             let there = goes.at(*here);
             if facing.dot(&there).powi(2) > GRAZING * GRAZING * there.norm_squared()
                 && let Some((gap, z)) = view.gap_at(&Point::from(there))

@@ -46,11 +46,14 @@ pub fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-/// `ln sum exp`, minus infinity for nothing.
+/// `ln sum exp`, minus infinity for nothing; what is not a number makes the whole so.
 #[must_use]
 pub fn log_sum(values: &[f64]) -> f64 {
+    if values.iter().all(|v| *v == f64::NEG_INFINITY) {
+        return f64::NEG_INFINITY;
+    }
     let top = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if top == f64::NEG_INFINITY { top } else { top + values.iter().map(|v| (v - top).exp()).sum::<f64>().ln() }
+    top + values.iter().map(|v| (v - top).exp()).sum::<f64>().ln()
 }
 
 /// Angles made continuous: each one moved by full turns to lie within half a turn of the one before.
@@ -74,6 +77,15 @@ mod tests {
         assert_eq!(quantile(&[3.0, 1.0, 2.0], 0.5), Some(2.0));
         assert_eq!(quantile(&[1.0, 2.0], 0.25), Some(1.25));
         assert_eq!(median(&[]), None);
+    }
+
+    #[test]
+    fn sums_of_logarithms_hold_where_their_exponentials_do_not() {
+        const NOTHING: f64 = f64::NEG_INFINITY;
+        assert_eq!([log_sum(&[]), log_sum(&[NOTHING, NOTHING])], [NOTHING, NOTHING]);
+        assert_eq!(log_sum(&[-2000.0, NOTHING]), -2000.0);
+        assert!((log_sum(&[1000.0, 1000.0]) - 1000.0 - 2.0f64.ln()).abs() < 1e-12);
+        assert!(log_sum(&[1.0, f64::NAN]).is_nan() && log_sum(&[f64::NAN]).is_nan());
     }
 
     #[test]

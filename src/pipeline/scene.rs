@@ -295,8 +295,12 @@ fn judged(group: &Group, reasoner: &dyn Reasoner, outlines: &[Rect]) -> Option<J
         };
         let standoff = face.coordinates(&region.grip)[2];
         let held = (-0.5 * ((standoff - config.geometry.grip_standoff_m) / 0.05).powi(2)).exp();
-        // A hand that was lost on its way from or to the closed place is near the front of whatever it was lost at.
-        let near = 1.0 / hands::grip_std_m(trajectory.closed_end_seen());
+        // A hand that was lost on its way from or to the closed place is near the front of whatever it was lost at. Of this
+        // the paper says nothing.
+        let near = match config.inference.method {
+            InferenceMethod::Posterior => 1.0 / hands::grip_std_m(trajectory.closed_end_seen()),
+            InferenceMethod::Paper => 1.0,
+        };
         held * near * (0.2 + face.support) * if clip.part.is_some() { 2.0 } else { 1.0 }
     };
     let &best = members
