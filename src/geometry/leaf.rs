@@ -2,7 +2,7 @@
 
 use super::Face;
 use super::face::Rect;
-use super::moved::{GRAZING, View};
+use super::moved::{View, edge_on};
 use crate::articulation::Articulation;
 use crate::math::{Point, Pose, Vector, stats, unit};
 
@@ -73,10 +73,10 @@ impl Leaf {
         let normal = motion.rotation * self.normal;
         let front = motion * point;
         let ray = unit(&(front - view.eye))?;
-        let slant = normal.dot(&ray);
-        if slant.abs() < GRAZING {
+        if edge_on(&ray, &normal) {
             return None;
         }
+        let slant = normal.dot(&ray);
         // Seen from behind, the surface is the leaf's back.
         let at = if slant < 0.0 { front } else { front - normal * self.board_m };
         let (gap, depth) = view.gap(&at)?;

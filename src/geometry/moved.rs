@@ -62,10 +62,15 @@ pub(super) const NEAREST_M: f64 = 0.15;
 /// A leaf seen at less than this slant (cosine) shows its edge.
 pub(super) const GRAZING: f64 = 0.2;
 
+/// Whether a ray (of any length) meets a surface with this normal (unit, in the same frame) edge-on.
+pub(super) fn edge_on(ray: &Vector, normal: &Vector) -> bool {
+    normal.dot(ray).powi(2) <= GRAZING * GRAZING * ray.norm_squared()
+}
+
 impl View<'_> {
     /// Whether a surface at `p` with this normal is seen edge-on: a small error of its place is a large one of its depth.
     pub(super) fn grazes(&self, p: &Point, normal: &Vector) -> bool {
-        crate::math::unit(&(p - self.eye)).is_none_or(|ray| normal.dot(&ray).abs() < GRAZING)
+        edge_on(&(p - self.eye), normal)
     }
 
     /// Rotation from the camera's axes to the world's.

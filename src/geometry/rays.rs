@@ -8,7 +8,7 @@ use nalgebra::Matrix3;
 
 use super::Face;
 use super::face::Rect;
-use super::moved::{GRAZING, Hold, NEAREST_M, View, tolerance};
+use super::moved::{GRAZING, Hold, NEAREST_M, View, edge_on, tolerance};
 use crate::articulation::{Articulation, JointKind};
 use crate::math::{Point, Vector, rotation};
 
@@ -234,7 +234,7 @@ impl Rays {
                     .map(|(way, depth)| {
                         let way = face_from_camera * way;
                         let front = -eye.z / way.z;
-                        if way.z.abs() < GRAZING * way.norm() || front < NEAREST_M {
+                        if edge_on(&way, &Vector::z()) || front < NEAREST_M {
                             let front = f64::INFINITY;
                             return (way, Ray { depth, front, part: 0.0, by_still: ROOM_M, left: 0.0 });
                         }

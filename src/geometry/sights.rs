@@ -12,7 +12,7 @@ use nalgebra::Matrix3;
 
 use super::Face;
 use super::face::Rect;
-use super::moved::{GRAZING, Hold, View, tolerance};
+use super::moved::{Hold, View, edge_on, tolerance};
 use super::outline::SMALLEST;
 use super::rays::Rays;
 use crate::articulation::{Articulation, JointKind};
@@ -233,7 +233,7 @@ pub(super) fn seen_share(
             // Where it goes. Within the face there is a surface whether the part slid there or not, and edge-on a small error
             // of the opening is a large one of the depth: both tell nothing.
             let there = goes.at(*here);
-            if facing.dot(&there).powi(2) > GRAZING * GRAZING * there.norm_squared()
+            if !edge_on(&there, &facing)
                 && let Some((gap, z)) = view.gap_at(&Point::from(there))
                 && moves(z)
                 && gap >= -tolerance(z)
