@@ -74,13 +74,10 @@ fn hinge<'a>(
 ) -> Option<(&'a AxisCandidate, path::AboutLine)> {
     let lines = || candidates.iter().filter(|c| c.source == AxisSource::Line);
     let named = lines().any(|c| c.named > 0.0);
-    lines()
-        .filter(|c| !named || c.named > 0.0)
-        .filter_map(|c| {
-            let fit = path::about_line(path, &c.joint.line())?;
-            (fit.radius <= config.max_radius_m).then_some((c, fit))
-        })
-        .min_by(|a, b| a.1.radial_variance.total_cmp(&b.1.radial_variance))
+    let asked: Vec<_> = lines().filter(|c| !named || c.named > 0.0).collect();
+    let fits = path::about_lines(path, &asked.iter().map(|c| c.joint.line()).collect::<Vec<_>>());
+    let within = asked.into_iter().zip(fits).filter(|(_, fit)| fit.radius <= config.max_radius_m);
+    within.min_by(|a, b| a.1.radial_variance.total_cmp(&b.1.radial_variance))
 }
 
 /// The direction of the room that the hand's path runs along best, and what variance across it is left, m^2.

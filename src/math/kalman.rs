@@ -1,12 +1,12 @@
 //! Kalman filter with a chi-square gate and Rauch-Tung-Striebel smoother for a hand under the integrated OU model (§A.2).
 //!
 //! With isotropic observation noise the three coordinates have one and the same 2 x 2 covariance: it is propagated once,
-//! the three means ride along as rows.
+//! the three means ride along, side by side. Everything is symmetric and small, so the matrices are written out.
 
-use nalgebra::{Matrix2, Matrix3x2, RowVector2};
+use wide::f64x4;
 
-use super::ou::IntegratedOu;
-use super::{Point, Vector};
+use super::Point;
+use super::ou::{IntegratedOu, Transition};
 
 /// How to filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,16 +27,33 @@ pub struct Filter {
 pub struct Smoothed {
     /// Position at each observation time.
     pub positions: Vec<Point>,
-    /// Velocity at each observation time, m/s.
-    pub velocities: Vec<Vector>,
-    /// Variance of each coordinate of each position, m^2.
-    pub variances: Vec<f64>,
     /// Whether the observation passed the gate.
     pub accepted: Vec<bool>,
 }
 
-/// The prediction of one step: transition, mean, covariance, and whether the filter started (again) here.
-type Predicted = (Matrix2<f64>, Matrix3x2<f64>, Matrix2<f64>, bool);
+/// A symmetric 2 x 2 matrix: `[[p, c], [c, v]]`.
+#[derive(Debug, Clone, Copy)]
+struct Symmetric {
+    p: f64,
+    c: f64,
+    v: f64,
+}
+
+/// The hand at one observation: the three coordinates side by side, and the covariance that each of them had at the time.
+#[derive(Debug, Clone, Copy)]
+struct Step {
+    /// Metres.
+    position: f64x4,
+    /// Metres a second.
+    velocity: f64x4,
+    covariance: Symmetric,
+    /// The covariance before the observation was seen.
+    predicted: Symmetric,
+    /// Transition from the step before, `[[1, f], [0, e]]`. Where the filter starts (again) nothing of it is left.
+    kept: f64,
+    f: f64,
+    e: f64,
+}
 
 /// Filters forward and smooths backward. `times` (s) must not decrease; both slices have one length.
 ///
@@ -45,114 +62,119 @@ type Predicted = (Matrix2<f64>, Matrix3x2<f64>, Matrix2<f64>, bool);
 #[must_use]
 pub fn smooth(times: &[f64], observations: &[Point], filter: &Filter) -> Smoothed {
     let n = observations.len().min(times.len());
+    let mut accepted = vec![false; n];
+    let mut steps = Vec::with_capacity(n);
     let mut first = 0;
-    loop {
-        let (smoothed, restart) = pass(&times[first..n], &observations[first..n], filter);
-        match restart {
-            Some(lead) if first + lead < n => first += lead,
-            _ => {
-                // Before the first believed sample: its state, backwards in time.
-                let mut out = Smoothed {
-                    positions: Vec::with_capacity(n),
-                    velocities: Vec::with_capacity(n),
-                    variances: Vec::with_capacity(n),
-                    accepted: vec![false; first],
-                };
-                if let (Some(p), Some(v)) = (smoothed.positions.first(), smoothed.variances.first()) {
-                    out.positions.resize(first, *p);
-                    out.velocities.resize(first, Vector::zeros());
-                    out.variances.resize(first, *v);
-                }
-                out.positions.extend(smoothed.positions);
-                out.velocities.extend(smoothed.velocities);
-                out.variances.extend(smoothed.variances);
-                out.accepted.extend(smoothed.accepted);
-                return out;
-            }
-        }
+    while let Some(lead) =
+        forward(&times[first..n], &observations[first..n], filter, &mut steps, &mut accepted[first..])
+    {
+        accepted[first..first + lead].fill(false);
+        first += lead;
     }
+    backward(&mut steps);
+    // Before the first believed sample: its position.
+    let steps = steps.first().into_iter().cycle().take(first).chain(&steps);
+    let point = |step: &Step| {
+        let [x, y, z, _] = step.position.to_array();
+        Point::new(x, y, z)
+    };
+    Smoothed { positions: steps.map(point).collect(), accepted }
 }
 
-/// One forward and backward pass; also how many samples a contradicted start has, if there is one.
-fn pass(times: &[f64], observations: &[Point], filter: &Filter) -> (Smoothed, Option<usize>) {
-    let n = observations.len().min(times.len());
+/// Filters forward, into `steps` and `accepted`; of a start that is contradicted, how many samples it has.
+fn forward(
+    times: &[f64],
+    observations: &[Point],
+    filter: &Filter,
+    steps: &mut Vec<Step>,
+    accepted: &mut [bool],
+) -> Option<usize> {
     let r = filter.observation_std_m.powi(2);
-    let prior = Matrix2::new(r, 0.0, 0.0, filter.motion.velocity_variance());
-    let start = |p: &Point| Matrix3x2::new(p.x, 0.0, p.y, 0.0, p.z, 0.0);
-
-    let mut means: Vec<Matrix3x2<f64>> = Vec::with_capacity(n);
-    let mut covariances: Vec<Matrix2<f64>> = Vec::with_capacity(n);
-    // Predictions of step t from t-1, kept for the backward pass; identity transition at t = 0 and at a restart.
-    let mut predicted: Vec<Predicted> = Vec::with_capacity(n);
-    let mut accepted = vec![false; n];
+    let prior = Symmetric { p: r, c: 0.0, v: filter.motion.velocity_variance() };
+    let start = |position: f64x4| Step {
+        position,
+        velocity: f64x4::ZERO,
+        covariance: prior,
+        predicted: prior,
+        kept: 0.0,
+        f: 0.0,
+        e: 0.0,
+    };
     let mut rejected_in_a_row = 0;
-    let mut contradicted = None;
-
-    for t in 0..n {
-        let z = &observations[t];
-        if t == 0 {
-            means.push(start(z));
-            covariances.push(prior);
-            predicted.push((Matrix2::identity(), start(z), prior, true));
-            accepted[0] = true;
+    let mut restarted = false;
+    steps.clear();
+    for (t, z) in observations.iter().enumerate() {
+        let z = f64x4::from([z.x, z.y, z.z, 0.0]);
+        let Some(&Step { position, velocity, covariance: before, .. }) = steps.last() else {
+            steps.push(start(z));
+            accepted[t] = true;
             continue;
-        }
-        let (f, q) = filter.motion.discretise((times[t] - times[t - 1]).max(0.0));
-        let mean = means[t - 1] * f.transpose();
-        let covariance = f * covariances[t - 1] * f.transpose() + q;
-        let s = covariance[(0, 0)] + r;
-        let innovation = z.coords - mean.column(0);
-        let mahalanobis = innovation.norm_squared() / s;
-        let restart =
-            filter.restart_after > 0 && rejected_in_a_row >= filter.restart_after && mahalanobis > filter.gate;
-        if restart {
+        };
+        let Transition { f, e, q11, q12, q22 } = filter.motion.discretise((times[t] - times[t - 1]).max(0.0));
+        let moved = before.c + f * before.v;
+        let predicted =
+            Symmetric { p: before.p + f * (before.c + moved) + q11, c: e * moved + q12, v: e * e * before.v + q22 };
+        let (position, velocity) = (position + velocity * f, velocity * e);
+        let innovation = z - position;
+        let s = predicted.p + r;
+        let (off, gate) = ((innovation * innovation).reduce_add(), filter.gate * s);
+        if off > gate && filter.restart_after > 0 && rejected_in_a_row >= filter.restart_after {
             // As many samples as it takes to restart are needed to be believed against them.
             let lead = accepted[..t].iter().filter(|a| **a).count();
-            if lead <= filter.restart_after && contradicted.is_none() && predicted[1..].iter().all(|p| !p.3) {
-                contradicted = Some(t - rejected_in_a_row);
+            if lead <= filter.restart_after && !restarted {
+                return Some(t - rejected_in_a_row);
             }
-            means.push(start(z));
-            covariances.push(prior);
-            predicted.push((Matrix2::identity(), start(z), prior, true));
-            accepted[t] = true;
+            restarted = true;
             rejected_in_a_row = 0;
-        } else if mahalanobis <= filter.gate {
-            let gain = covariance.column(0) / s;
-            means.push(mean + innovation * gain.transpose());
-            covariances.push(covariance - gain * RowVector2::new(covariance[(0, 0)], covariance[(0, 1)]));
-            predicted.push((f, mean, covariance, false));
             accepted[t] = true;
-            rejected_in_a_row = 0;
-        } else {
-            means.push(mean);
-            covariances.push(covariance);
-            predicted.push((f, mean, covariance, false));
-            rejected_in_a_row += 1;
+            steps.push(start(z));
+            continue;
         }
+        let believed = off <= gate;
+        accepted[t] = believed;
+        rejected_in_a_row = if believed { 0 } else { rejected_in_a_row + 1 };
+        // Weight of the innovation a variance, and what is left of the variance.
+        let (share, left) = if believed { (1.0 / s, r / s) } else { (0.0, 1.0) };
+        steps.push(Step {
+            position: position + innovation * (predicted.p * share),
+            velocity: velocity + innovation * (predicted.c * share),
+            covariance: Symmetric {
+                p: predicted.p * left,
+                c: predicted.c * left,
+                v: predicted.v - predicted.c * predicted.c * share,
+            },
+            predicted,
+            kept: 1.0,
+            f,
+            e,
+        });
     }
+    None
+}
 
-    for t in (0..n.saturating_sub(1)).rev() {
-        let (f, predicted_mean, predicted_covariance, restarted) = predicted[t + 1];
-        // A restart cuts the chain: what follows says nothing about what came before.
-        let Some(inverse) = predicted_covariance.try_inverse().filter(|_| !restarted) else { continue };
-        let gain = covariances[t] * f.transpose() * inverse;
-        let mean_step = means[t + 1] - predicted_mean;
-        let covariance_step = covariances[t + 1] - predicted_covariance;
-        means[t] += mean_step * gain.transpose();
-        covariances[t] += gain * covariance_step * gain.transpose();
+/// Turns the means of `steps` from what was known at the time into what is known of all observations. A restart cuts the
+/// chain: what follows says nothing about what came before.
+fn backward(steps: &mut [Step]) {
+    for t in (1..steps.len()).rev() {
+        let Step { position, velocity, predicted: Symmetric { p, c, v }, kept, f, e, .. } = steps[t];
+        let now = &mut steps[t - 1];
+        let old = now.covariance;
+        // Covariance of this step with the next one, times the inverse of the next one's.
+        let (pp, pv) = (kept * old.p + f * old.c, e * old.c);
+        let (vp, vv) = (kept * old.c + f * old.v, e * old.v);
+        let determinant = p * v - c * c;
+        let share = if determinant > 0.0 { 1.0 / determinant } else { 0.0 };
+        let position = (position - (now.position + now.velocity * f)) * share;
+        let velocity = (velocity - now.velocity * e) * share;
+        now.position += position * (pp * v - pv * c) + velocity * (pv * p - pp * c);
+        now.velocity += position * (vp * v - vv * c) + velocity * (vv * p - vp * c);
     }
-    let smoothed = Smoothed {
-        positions: means.iter().map(|m| Point::from(m.column(0).into_owned())).collect(),
-        velocities: means.iter().map(|m| m.column(1).into_owned()).collect(),
-        variances: covariances.iter().map(|c| c[(0, 0)]).collect(),
-        accepted,
-    };
-    (smoothed, contradicted)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Vector;
     use rand::SeedableRng;
     use rand_distr::{Distribution, Normal};
 
@@ -230,11 +252,11 @@ mod tests {
         for t in 1..n {
             information[(2 * t, 2 * t)] += 1.0 / r;
             vector[2 * t] += truth[t].x / r;
-            let (step, q) = f.motion.discretise(times[t] - times[t - 1]);
+            let (step, q) = f.motion.discretise(times[t] - times[t - 1]).matrices();
             let qi = q.try_inverse().unwrap();
             let mut j = nalgebra::DMatrix::<f64>::zeros(2, 2 * n);
             j.view_mut((0, 2 * t - 2), (2, 2)).copy_from(&(-step));
-            j.view_mut((0, 2 * t), (2, 2)).copy_from(&Matrix2::identity());
+            j.view_mut((0, 2 * t), (2, 2)).copy_from(&nalgebra::Matrix2::identity());
             let q_dyn = nalgebra::DMatrix::from_fn(2, 2, |a, b| qi[(a, b)]);
             information += j.transpose() * q_dyn * j;
         }

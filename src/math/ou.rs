@@ -3,8 +3,6 @@
 //! One coordinate has the state (position, velocity) with `dv = -lambda v dt + sqrt(psi) dW`. The three coordinates of a
 //! hand share the model, so the paper's 6 x 6 matrices are `kron(I3, .)` of the 2 x 2 ones here.
 
-use nalgebra::Matrix2;
-
 /// Parameters of the process.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IntegratedOu {
@@ -28,23 +26,56 @@ impl IntegratedOu {
         self.psi / (2.0 * self.lambda)
     }
 
-    /// Transition `F(dt)` and process noise `Q(dt)` over `dt` seconds.
+    /// One step of `dt` seconds.
     #[must_use]
-    pub fn discretise(&self, dt: f64) -> (Matrix2<f64>, Matrix2<f64>) {
+    pub fn discretise(&self, dt: f64) -> Transition {
         let Self { lambda, psi } = *self;
         let x = lambda * dt;
         // Below this the closed form cancels to nothing; the limit is a velocity random walk.
         if x.abs() < 1e-4 {
-            let q11 = psi * dt.powi(3) / 3.0;
-            let q12 = psi * dt * dt / 2.0;
-            return (Matrix2::new(1.0, dt, 0.0, 1.0 - x), Matrix2::new(q11, q12, q12, psi * dt));
+            return Transition {
+                f: dt,
+                e: 1.0 - x,
+                q11: psi * dt.powi(3) / 3.0,
+                q12: psi * dt * dt / 2.0,
+                q22: psi * dt,
+            };
         }
-        let e = (-x).exp();
-        let one_minus_e = -(-x).exp_m1();
-        let q11 = psi / lambda.powi(2) * (dt - 2.0 * one_minus_e / lambda - (-2.0 * x).exp_m1() / (2.0 * lambda));
-        let q12 = psi / (2.0 * lambda.powi(2)) * one_minus_e.powi(2);
-        let q22 = -psi / (2.0 * lambda) * (-2.0 * x).exp_m1();
-        (Matrix2::new(1.0, one_minus_e / lambda, 0.0, e), Matrix2::new(q11, q12, q12, q22))
+        // `1 - exp(-x)` as it is, so that short steps keep their digits; `1 - exp(-2x)` follows from it.
+        let gone = -(-x).exp_m1();
+        let gone_twice = gone * (2.0 - gone);
+        Transition {
+            f: gone / lambda,
+            e: 1.0 - gone,
+            q11: psi / lambda.powi(3) * (x - 2.0 * gone + gone_twice / 2.0),
+            q12: psi / (2.0 * lambda.powi(2)) * gone.powi(2),
+            q22: psi / (2.0 * lambda) * gone_twice,
+        }
+    }
+}
+
+/// A step of the process for one coordinate: (position, velocity) is multiplied by `F = [[1, f], [0, e]]` and gains the noise
+/// `Q = [[q11, q12], [q12, q22]]`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Transition {
+    /// Seconds for which the velocity counts.
+    pub f: f64,
+    /// Share of the velocity that is left.
+    pub e: f64,
+    /// Variance that the position gains, m^2.
+    pub q11: f64,
+    /// Covariance that both gain, m^2/s.
+    pub q12: f64,
+    /// Variance that the velocity gains, m^2/s^2.
+    pub q22: f64,
+}
+
+#[cfg(test)]
+impl Transition {
+    /// `F` and `Q`.
+    pub(super) fn matrices(&self) -> (nalgebra::Matrix2<f64>, nalgebra::Matrix2<f64>) {
+        let Self { f, e, q11, q12, q22 } = *self;
+        (nalgebra::Matrix2::new(1.0, f, 0.0, e), nalgebra::Matrix2::new(q11, q12, q12, q22))
     }
 }
 
@@ -55,7 +86,7 @@ mod tests {
     /// Reference values from a matrix exponential (van Loan) of the same process.
     #[test]
     fn matches_the_matrix_exponential() {
-        let (f, q) = IntegratedOu { lambda: 0.1, psi: 2e-5 }.discretise(1.0);
+        let (f, q) = IntegratedOu { lambda: 0.1, psi: 2e-5 }.discretise(1.0).matrices();
         assert!((f[(0, 1)] - 0.951_625_820).abs() < 1e-8);
         assert!((f[(1, 1)] - 0.904_837_418).abs() < 1e-8);
         assert!((q[(0, 0)] - 6.189_190_66e-6).abs() < 1e-12, "{q}");
@@ -66,8 +97,8 @@ mod tests {
     #[test]
     fn two_half_steps_equal_one_step() {
         let ou = IntegratedOu::from_time_and_speed(1.0 / 3.0, 0.3);
-        let (f, q) = ou.discretise(0.2);
-        let (fh, qh) = ou.discretise(0.1);
+        let (f, q) = ou.discretise(0.2).matrices();
+        let (fh, qh) = ou.discretise(0.1).matrices();
         assert!((fh * fh - f).norm() < 1e-12);
         assert!((fh * qh * fh.transpose() + qh - q).norm() < 1e-12);
     }
@@ -75,8 +106,9 @@ mod tests {
     #[test]
     fn the_limit_of_small_steps_is_continuous() {
         let ou = IntegratedOu { lambda: 3.0, psi: 0.5 };
-        let below = ou.discretise(0.99e-4 / 3.0).1;
-        let above = ou.discretise(1.01e-4 / 3.0).1;
-        assert!((above[(1, 1)] / below[(1, 1)] - 1.01 / 0.99).abs() < 1e-3);
+        let below = ou.discretise(0.99e-4 / 3.0);
+        let above = ou.discretise(1.01e-4 / 3.0);
+        assert!((above.q22 / below.q22 - 1.01 / 0.99).abs() < 1e-3);
+        assert!((above.f / below.f - 1.01 / 0.99).abs() < 1e-3);
     }
 }

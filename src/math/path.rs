@@ -1,5 +1,7 @@
 //! How well a motion of one degree of freedom explains a path: distances to a line, and to a direction (§A.7).
 
+use wide::f64x4;
+
 use super::line::Line;
 use super::{Point, Vector, centroid, reject, stats};
 
@@ -22,17 +24,41 @@ impl AboutLine {
     }
 }
 
+/// Lines that are worked on at once.
+const AT_ONCE: usize = 4;
+
 /// Measures a path about a line. `None` for an empty path.
 #[must_use]
 pub fn about_line(path: &[Point], line: &Line) -> Option<AboutLine> {
+    about(path, std::slice::from_ref(line)).map(|fits| fits[0])
+}
+
+/// Measures a path about each of many lines, as [`about_line`] does, several at a time. Empty for an empty path.
+#[must_use]
+pub fn about_lines(path: &[Point], lines: &[Line]) -> Vec<AboutLine> {
+    let mut out = Vec::with_capacity(lines.len());
+    for some in lines.chunks(AT_ONCE) {
+        out.extend(about(path, some).into_iter().flatten().take(some.len()));
+    }
+    out
+}
+
+/// A path about one to [`AT_ONCE`] lines; what stands where there is none means nothing.
+fn about(path: &[Point], lines: &[Line]) -> Option<[AboutLine; AT_ONCE]> {
+    let of = |value: &dyn Fn(&Line) -> f64| {
+        f64x4::from(std::array::from_fn::<f64, AT_ONCE, _>(|i| lines.get(i).map_or(0.0, value)))
+    };
+    let [x, y, z] = [0, 1, 2].map(|k| of(&|l| l.point[k]));
+    let [along_x, along_y, along_z] = [0, 1, 2].map(|k| of(&|l| l.direction[k]));
     let at = |p: &Point| {
-        let from = p - line.point;
-        let along = from.dot(&line.direction);
-        ((from.norm_squared() - along * along).max(0.0).sqrt(), along)
+        let [x, y, z] = [f64x4::splat(p.x) - x, f64x4::splat(p.y) - y, f64x4::splat(p.z) - z];
+        let along = x * along_x + y * along_y + z * along_z;
+        let square = x * x + y * y + z * z - along * along;
+        (square.max(f64x4::splat(0.0)).sqrt(), along)
     };
     // One pass: sums about the first point's values lose no digits where the spread is small.
     let (first_distance, first_along) = at(path.first()?);
-    let [mut d, mut dd, mut h, mut hh] = [0.0; 4];
+    let [mut d, mut dd, mut h, mut hh] = [f64x4::splat(0.0); 4];
     for p in path {
         let (distance, along) = at(p);
         let (distance, along) = (distance - first_distance, along - first_along);
@@ -41,13 +67,15 @@ pub fn about_line(path: &[Point], line: &Line) -> Option<AboutLine> {
         h += along;
         hh += along * along;
     }
-    let share = 1.0 / path.len() as f64;
-    let variance = |sum: f64, squares: f64| (share * squares - (share * sum).powi(2)).max(0.0);
-    Some(AboutLine {
-        radius: first_distance + share * d,
-        radial_variance: variance(d, dd),
-        axial_variance: variance(h, hh),
-    })
+    let share = f64x4::splat(1.0 / path.len() as f64);
+    let variance = |sum: f64x4, squares: f64x4| {
+        let mean = share * sum;
+        (share * squares - mean * mean).max(f64x4::splat(0.0)).to_array()
+    };
+    let radius = (first_distance + share * d).to_array();
+    let (radial, axial) = (variance(d, dd), variance(h, hh));
+    let fit = |i: usize| AboutLine { radius: radius[i], radial_variance: radial[i], axial_variance: axial[i] };
+    Some(std::array::from_fn(fit))
 }
 
 /// Share of a path within a torus about a line (§B.1): no further than `tolerance` of the median radius from the circle of the
@@ -92,6 +120,11 @@ mod tests {
         let axis = Line { point: Point::new(0.0, 0.0, 5.0), direction: Vector::z() };
         let fit = about_line(&arc, &axis).unwrap();
         assert!((fit.radius - 0.5).abs() < 1e-12 && fit.variance() < 1e-20);
+        let lines: Vec<Line> =
+            (0..11).map(|i| Line { point: Point::new(0.1 * f64::from(i), 0.0, 1.0), ..axis }).collect();
+        let one_by_one: Vec<_> = lines.iter().filter_map(|l| about_line(&arc, l)).collect();
+        assert_eq!(about_lines(&arc, &lines), one_by_one);
+        assert!(about_lines(&[], &lines).is_empty() && about_lines(&arc, &[]).is_empty());
         assert_eq!(torus_inliers(&arc, &axis, |_| 0.02), Some(1.0));
         let pull: Vec<Point> = (0..20).map(|i| Point::new(0.02 * f64::from(i), 1.0, 0.5)).collect();
         assert!(across(&pull, &Vector::x()).unwrap() < 1e-20 && across(&arc, &Vector::x()).unwrap() > 1e-3);
