@@ -233,9 +233,16 @@ fn rechosen(joint: &SceneJoint, against: &[Option<Refutation>], config: &Config)
     let right = |of: &[Hypothesis]| -> f64 {
         of.iter().filter(|h| inference::is_right(&answer.joint, &h.joint)).map(|h| h.share).sum()
     };
-    // What was too unlikely to be listed and agrees with an answer that stays is counted, too.
-    let unlisted = if chosen == 0 { (joint.joint_probability - right(&joint.hypotheses)).max(0.0) } else { 0.0 };
-    let joint_probability = right(&hypotheses) + unlisted / left(&joint.hypotheses, &nats);
+    // What was too unlikely to be listed and agrees with an answer that stays is counted, too. It is no more than is left of
+    // the type beside all that is listed: that of which agreed and no longer does, once it was fitted, does not.
+    let unlisted = if chosen == 0 {
+        let listed: f64 = joint.hypotheses.iter().filter(|h| h.joint.kind == answer.joint.kind).map(|h| h.share).sum();
+        let beside = (joint.type_probability - listed).max(0.0);
+        (joint.joint_probability - right(&joint.hypotheses)).clamp(0.0, beside)
+    } else {
+        0.0
+    };
+    let joint_probability = (right(&hypotheses) + unlisted / left(&joint.hypotheses, &nats)).min(answer.type_share);
     SceneJoint { type_probability: answer.type_share, joint_probability, hypotheses, ..joint.under(&answer) }
 }
 
@@ -257,7 +264,8 @@ fn reweighed(hypotheses: &[Hypothesis], nats: &[f64]) -> Vec<Hypothesis> {
         .zip(nats)
         .map(|(h, n)| Hypothesis {
             share: h.share * (-n).exp() / left,
-            type_share: (h.type_share - lost(hypotheses, nats, |other| other.joint.kind == h.joint.kind)) / left,
+            type_share: ((h.type_share - lost(hypotheses, nats, |other| other.joint.kind == h.joint.kind)) / left)
+                .min(1.0),
             ..h.clone()
         })
         .collect()
@@ -430,6 +438,20 @@ mod tests {
         let after = rechosen(&joint, &[None, refuted(1.0), None], &config);
         let left = 1.0 + 0.39 * (-config.validation.refuted_nats).exp_m1();
         assert!(after.joint == DRAWER && (after.joint_probability - 0.58 / left).abs() < 1e-12, "{after:?}");
+    }
+
+    #[test]
+    fn an_answer_is_never_surer_than_its_type() {
+        let (config, mut joint) = (Config::default(), doubtful());
+        // One that agreed with the answer when it was judged, and is beside it since it was fitted.
+        joint.hypotheses[0].share = 0.3;
+        let beside = Articulation { axis: Vector::z(), ..DRAWER };
+        joint.hypotheses.push(hypothesis(beside, 0.3, 0.605, 0.445));
+        joint.joint_probability = 0.6;
+        let after = rechosen(&joint, &[None, refuted(1.0), refuted(1.0)], &config);
+        let share = after.hypotheses[0].share;
+        assert!(after.joint == DRAWER && after.joint_probability >= share, "{after:?}");
+        assert!(after.joint_probability <= after.type_probability && after.type_probability <= 1.0, "{after:?}");
     }
 
     #[test]

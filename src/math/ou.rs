@@ -44,12 +44,14 @@ impl IntegratedOu {
         // `1 - exp(-x)` as it is, so that short steps keep their digits; `1 - exp(-2x)` follows from it.
         let gone = -(-x).exp_m1();
         let gone_twice = gone * (2.0 - gone);
+        let time = 1.0 / lambda;
+        let half = 0.5 * psi * time;
         Transition {
-            f: gone / lambda,
+            f: gone * time,
             e: 1.0 - gone,
-            q11: psi / lambda.powi(3) * (x - 2.0 * gone + gone_twice / 2.0),
-            q12: psi / (2.0 * lambda.powi(2)) * gone.powi(2),
-            q22: psi / (2.0 * lambda) * gone_twice,
+            q11: half * time * time * (2.0 * (x - 2.0 * gone) + gone_twice),
+            q12: half * time * gone * gone,
+            q22: half * gone_twice,
         }
     }
 }
