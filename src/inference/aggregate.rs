@@ -71,7 +71,8 @@ pub fn group(clips: &[Held], missed: &[Missed], config: &config::Inference) -> V
 
 /// The part that clip `i` closes because no other of its name stands open within reach of the hand's way. Hands that were seen
 /// badly or in part only are far apart even on one part; what was left open decides then. Where the furniture has no name,
-/// only the clip before counts.
+/// only the clip before counts; so it does where nothing of that name stands open: people call one thing by two names sooner
+/// than they close what is shut.
 fn only_one_open(
     groups: &[Vec<usize>],
     clips: &[Held],
@@ -83,26 +84,29 @@ fn only_one_open(
     if clip.action != Action::Close {
         return None;
     }
-    let mut open = (0..groups.len()).filter(|&g| {
+    let open = |g: usize, called: &dyn Fn(&Held, usize) -> bool| {
         groups[g].last().is_some_and(|&j| {
             let before = &clips[j];
-            let named = match (before.furniture, clip.furniture) {
-                (Some(a), Some(b)) => a == b,
-                _ => j + 1 == i,
-            };
             // What nobody saw may have closed that one, or opened another.
             let unseen = missed
                 .iter()
                 .any(|m| (j + 1..=i).contains(&m.after) && m.furniture.zip(clip.furniture).is_none_or(|(a, b)| a == b));
             before.action == Action::Open
-                && named
+                && called(before, j)
                 && !unseen
                 && (j + 1 == i || faces_agree(before, clip, config))
-                && names_agree(before, clip)
                 && apart(before.path, clip.path) <= config.merge_open_m
         })
-    });
-    open.next().filter(|_| open.next().is_none())
+    };
+    let named = |before: &Held, j: usize| match (before.furniture, clip.furniture) {
+        (Some(a), Some(b)) => a == b,
+        _ => j + 1 == i && names_agree(before, clip),
+    };
+    let mut of_name = (0..groups.len()).filter(|&g| open(g, &named));
+    match of_name.next() {
+        Some(only) => of_name.next().is_none().then_some(only),
+        None => (0..groups.len()).find(|&g| open(g, &|_, j| j + 1 == i)),
+    }
 }
 
 /// Shortest distance between the points of two paths; infinite where one has none.
