@@ -80,13 +80,13 @@ fn recordings(
         let Predicted { scene, predictions, usage } = predict(recording, config, asked)?;
         total = model::added(total, usage);
         for c in &scene.clips {
-            let joint = scene.joints.iter().find(|j| j.clips.contains(&c.clip.clip));
+            let joint = scene.joint_of(&c.clip.clip);
             rows.push(vec![
                 scene.recording.clone(),
                 c.clip.clip.clone(),
                 c.clip.narration.clone(),
                 joint.map_or("-".to_owned(), |j| j.id.clone()),
-                words::clip_reason(c),
+                words::clip_reason(c, joint),
             ]);
         }
         all.predictions.extend(predictions.predictions);

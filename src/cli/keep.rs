@@ -103,7 +103,7 @@ fn marked_image(
         let [a, b] = line.segment.ends();
         draw(&a, &b, LINE, 0);
     }
-    let joint = scene.joints.iter().find(|j| j.clips.contains(&clip.clip.clip));
+    let joint = scene.joint_of(&clip.clip.clip);
     if let Some(part) = joint.and_then(|j| twin.furniture.iter().map(|f| &f.part).find(|p| p.id == j.id)) {
         for solid in part.solids.iter().take(1) {
             let c = solid.shape.corners();

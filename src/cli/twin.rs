@@ -223,7 +223,8 @@ pub fn summary(scene: &Scene, twin: &Twin, validation: &Validation) -> String {
     if !reasons.is_empty() {
         text += &format!("\n{reasons}");
     }
-    let abstained: Vec<&pipeline::ClipResult> = scene.clips.iter().filter(|c| c.joint.found().is_none()).collect();
+    let abstained: Vec<&pipeline::ClipResult> =
+        scene.clips.iter().filter(|c| c.joint.found().is_none() && scene.joint_of(&c.clip.clip).is_none()).collect();
     if !abstained.is_empty() {
         text += &format!("\n{} of {} clips without an answer:\n", abstained.len(), scene.clips.len());
         for c in abstained {

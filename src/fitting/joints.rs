@@ -343,6 +343,7 @@ fn found(entry: &Entry, frame: &Frame, config: &config::Fitting) -> Result<Found
         id: entry.id.clone(),
         joint,
         clips: Vec::new(),
+        told: Vec::new(),
         furniture: entry.label.clone(),
         type_probability: 1.0,
         grip,

@@ -465,6 +465,7 @@ mod tests {
             furniture: None,
             type_probability: 1.0,
             joint_probability: 1.0,
+            told: Vec::new(),
             uncertainty: None,
             grip: Point::new(0.2, -0.035, 0.8),
             face: Some(face),

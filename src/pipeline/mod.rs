@@ -82,6 +82,9 @@ pub struct SceneJoint {
     pub joint: Articulation,
     /// Names of the clips that show it.
     pub clips: Vec<String>,
+    /// Clips without a hand of which the narrations tell that they move it, too.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub told: Vec<Told>,
     /// The word that people used for the furniture.
     pub furniture: Option<String>,
     /// Probability of the type.
@@ -106,6 +109,16 @@ pub struct SceneJoint {
     /// physics was asked, or where it is not to be asked (`validation.feedback`).
     #[serde(default)]
     pub hypotheses: Vec<Hypothesis>,
+}
+
+/// A clip in which no hand was followed, and which by its narration closes what the clip before it opened, or opens what the
+/// clip after it closes.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Told {
+    /// Its name.
+    pub clip: String,
+    /// The name of that other clip; the part moved as far in either.
+    pub with: String,
 }
 
 /// One way in which a part could move, with what depends on it.
@@ -133,6 +146,13 @@ pub struct Hypothesis {
 }
 
 impl SceneJoint {
+    /// Which of `clips` shows what a clip does: itself, or the one that a narration ties it to.
+    #[must_use]
+    pub fn shown_by(&self, clip: &str) -> Option<usize> {
+        let with = self.told.iter().find(|t| t.clip == clip).map_or(clip, |t| t.with.as_str());
+        self.clips.iter().position(|c| c == with)
+    }
+
     /// The same part under one of its hypotheses; its probabilities stay as they are.
     #[must_use]
     pub fn under(&self, hypothesis: &Hypothesis) -> Self {
@@ -163,6 +183,14 @@ pub struct Scene {
     /// What stands around; `None` where it was not asked for or not seen.
     #[serde(default)]
     pub surroundings: Option<RoomCells>,
+}
+
+impl Scene {
+    /// The joint that a clip moves, seen or told.
+    #[must_use]
+    pub fn joint_of(&self, clip: &str) -> Option<&SceneJoint> {
+        self.joints.iter().find(|j| j.shown_by(clip).is_some())
+    }
 }
 
 /// Told how far the work is: (step, done, total).

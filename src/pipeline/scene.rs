@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use super::clip::{self, part_shape};
 use super::refit;
-use super::{ClipResult, Hypothesis, SceneJoint};
-use crate::articulation::{Articulation, JointKind};
+use super::{ClipResult, Hypothesis, SceneJoint, Told};
+use crate::articulation::{Action, Articulation, JointKind};
 use crate::config::{Config, InferenceMethod};
 use crate::geometry::Rect;
 use crate::geometry::sights::{self, Sights};
@@ -70,7 +70,40 @@ pub(super) fn merge(
     for (i, joint) in joints.iter_mut().enumerate() {
         joint.id = format!("joint_{i}");
     }
+    if config.inference.merge_clips {
+        for told in told(clips) {
+            if let Some(joint) = joints.iter_mut().find(|j| j.clips.contains(&told.with)) {
+                joint.told.push(told);
+            }
+        }
+    }
     joints
+}
+
+/// Clips without a hand, and what they move by their narrations: who closes something closes what was just opened, unless
+/// it has another name.
+fn told(clips: &[ClipResult]) -> Vec<Told> {
+    let mut moving: Vec<(&ClipResult, narration::Reading)> = clips
+        .iter()
+        .map(|clip| (clip, narration::read(&clip.clip)))
+        .filter(|(clip, reading)| clip.trajectory.is_some() || reading.moves_joint == Some(true))
+        .collect();
+    moving.sort_by_key(|(clip, _)| clip.clip.start_frame);
+    moving
+        .windows(2)
+        .filter_map(|pair| {
+            let [(before, opens), (after, closes)] = pair else { return None };
+            let name = |reading: &narration::Reading| reading.furniture.clone().filter(|_| reading.names_furniture());
+            let one = name(opens).zip(name(closes)).is_none_or(|(a, b)| a == b);
+            let actions = [opens.action, closes.action] == [Some(Action::Open), Some(Action::Close)];
+            let (lost, with) = match [before, after].map(|c| c.trajectory.is_some()) {
+                [true, false] => (after, before),
+                [false, true] => (before, after),
+                _ => return None,
+            };
+            (one && actions).then(|| Told { clip: lost.clip.clip.clone(), with: with.clip.clip.clone() })
+        })
+        .collect()
 }
 
 /// What a narration says that names the furniture.
@@ -263,6 +296,7 @@ fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
         id: String::new(),
         joint: answer.joint,
         clips: members.iter().map(|&c| clips[c].clip.clip.clone()).collect(),
+        told: Vec::new(),
         // Where people said "it", a model may have seen what it was.
         furniture: members
             .iter()
@@ -480,5 +514,50 @@ fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around, round
         observed_range: widest,
         moved,
         refuted: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hands::Sample;
+    use crate::recording::Clip;
+
+    /// Clips by narration and whether a hand was followed, in the order of time.
+    fn clips(said: &[(&str, bool)]) -> Vec<ClipResult> {
+        let clip = |(i, (narration, hand)): (usize, &(&str, bool))| {
+            let [verb, noun] = [(); 2].map(|()| String::new());
+            let narration = (*narration).to_owned();
+            let clip = Clip { clip: i.to_string(), start_frame: 20 * i, end_frame: 20 * i + 9, narration, verb, noun };
+            let mut out = ClipResult::unanswered(clip, "no hand".to_owned());
+            let at = Point::origin();
+            let samples = vec![Sample { frame: 0, time_secs: 0.0, observed: at, smoothed: at, accepted: true }];
+            out.trajectory =
+                hand.then_some(Trajectory { side: None, samples, action: Action::Open, ends_seen: [true; 2] });
+            out
+        };
+        said.iter().enumerate().map(clip).collect()
+    }
+
+    #[test]
+    fn a_clip_without_a_hand_moves_what_its_narration_says() {
+        let told = |said: &[(&str, bool)]| -> Vec<[String; 2]> {
+            told(&clips(said)).into_iter().map(|t| [t.clip, t.with]).collect()
+        };
+        let pair = |clip: &str, with: &str| vec![[clip.to_owned(), with.to_owned()]];
+        assert_eq!(told(&[("open the oven", true), ("close the oven", false)]), pair("1", "0"));
+        assert_eq!(told(&[("open the drawer", false), ("close it", true)]), pair("0", "1"));
+        // What moves nothing does not come between.
+        let between = [("open the oven", true), ("wash hands", false), ("close the oven", false)];
+        assert_eq!(told(&between), pair("2", "0"));
+        for said in [
+            [("open the oven", true), ("close the drawer", false)],
+            [("close the oven", true), ("close the oven", false)],
+            [("open the oven", false), ("open the oven", true)],
+            [("open the oven", false), ("close the oven", false)],
+            [("open the oven", true), ("close the oven", true)],
+        ] {
+            assert!(told(&said).is_empty(), "{said:?}");
+        }
     }
 }

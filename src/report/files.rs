@@ -8,7 +8,7 @@ use crate::evaluation::truth::Stage;
 use crate::evaluation::{Prediction, Predictions};
 use crate::inference::{ClipJoint, Uncertainty};
 use crate::math::Point;
-use crate::pipeline::{ClipResult, Scene};
+use crate::pipeline::{ClipResult, Scene, Told};
 use crate::reasoning::words::Words;
 use crate::twin::Twin;
 
@@ -23,6 +23,9 @@ struct JointEntry<'a> {
     observed_range: f64,
     grip: Point,
     clips: &'a [String],
+    /// Clips without a hand, by their narrations.
+    #[serde(skip_serializing_if = "<[Told]>::is_empty")]
+    told: &'a [Told],
     #[serde(skip_serializing_if = "Vec::is_empty")]
     refuted: Vec<String>,
 }
@@ -84,6 +87,7 @@ pub fn articulations(scene: &Scene, reasoner: &str) -> crate::error::Result<Stri
                 observed_range: j.observed_range,
                 grip: j.grip,
                 clips: &j.clips,
+                told: &j.told,
                 refuted: words::refuted(j),
             })
             .collect(),
@@ -93,7 +97,7 @@ pub fn articulations(scene: &Scene, reasoner: &str) -> crate::error::Result<Stri
             .map(|c| ClipEntry {
                 clip: &c.clip.clip,
                 narration: &c.clip.narration,
-                joint_of_scene: scene.joints.iter().find(|j| j.clips.contains(&c.clip.clip)).map(|j| j.id.as_str()),
+                joint_of_scene: scene.joint_of(&c.clip.clip).map(|j| j.id.as_str()),
                 outcome: &c.joint,
                 words: c.words.as_ref(),
                 evidence: Evidence {
@@ -150,12 +154,14 @@ pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
                 stage: c.joint.reason().map(|_| stage(c)),
                 refuted: Vec::new(),
             };
-            let joint = scene.joints.iter().find(|j| j.clips.contains(&c.clip.clip));
-            let part = joint.and_then(|j| twin.furniture.iter().map(|f| &f.part).find(|p| p.id == j.id));
-            let (Some(joint), Some(trajectory)) = (joint, &c.trajectory) else { return row };
+            let Some((joint, at)) = scene.joint_of(&c.clip.clip).and_then(|j| Some((j, j.shown_by(&c.clip.clip)?)))
+            else {
+                return row;
+            };
+            let part = twin.furniture.iter().map(|f| &f.part).find(|p| p.id == joint.id);
             // A joint that could not be built is still an answer.
             let phi = part.map_or(joint.joint, |p| p.joint.articulation);
-            let path = trajectory.positions();
+            let path = c.trajectory.as_ref().map_or_else(|| vec![joint.grip], |t| t.positions());
             (row.reason, row.stage) = (None, None);
             row.kind = Some(phi.kind);
             row.axis = Some(phi.axis);
@@ -164,10 +170,9 @@ pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
                 crate::articulation::JointKind::Revolute => phi.line().project(&p),
                 crate::articulation::JointKind::Prismatic => path[0],
             });
-            row.range = joint.clips.iter().zip(&joint.moved).find(|(name, _)| **name == c.clip.clip).map(|(_, r)| *r);
             let said = joint.uncertainty.as_ref();
-            let at = joint.clips.iter().position(|name| *name == c.clip.clip);
-            row.range_std = said.zip(at).and_then(|(u, at)| u.moved_std.get(at).copied());
+            row.range = joint.moved.get(at).copied();
+            row.range_std = said.and_then(|u| u.moved_std.get(at).copied());
             // The joint's other clips have rows of their own.
             row.uncertainty = said.map(|u| Uncertainty { moved_std: Vec::new(), ..u.clone().about(&phi.axis) });
             row.part_box = part.map(|p| p.bounds);

@@ -86,12 +86,12 @@ pub fn render(
         .clips
         .iter()
         .map(|c| {
-            let joint = scene.joints.iter().find(|j| j.clips.contains(&c.clip.clip));
+            let joint = scene.joint_of(&c.clip.clip);
             ClipRow {
                 clip: &c.clip.clip,
                 narration: &c.clip.narration,
                 outcome: joint.map_or("abstained".to_owned(), |j| j.id.clone()),
-                reason: words::clip_reason(c),
+                reason: words::clip_reason(c, joint),
             }
         })
         .collect();

@@ -101,12 +101,16 @@ fn place(phi: &Articulation, face: Option<&Face>) -> String {
     }
 }
 
-/// What became of a clip, in words.
+/// What became of a clip, in words. `joint`: the one that it moves.
 #[must_use]
-pub fn clip_reason(clip: &ClipResult) -> String {
-    match &clip.joint {
-        Outcome::Abstained(reason) => reason.clone(),
-        Outcome::Found(j) => format!(
+pub fn clip_reason(clip: &ClipResult, joint: Option<&SceneJoint>) -> String {
+    let told = joint.and_then(|j| j.told.iter().find(|t| t.clip == clip.clip.clip));
+    match (&clip.joint, told) {
+        (Outcome::Abstained(reason), Some(told)) => {
+            format!("{reason}; by its narration it moves what {} moves", told.with)
+        }
+        (Outcome::Abstained(reason), None) => reason.clone(),
+        (Outcome::Found(j), _) => format!(
             "{} ({} sure), axis from {}, moved {}, hand within {} of its path",
             j.joint.kind.word(),
             sure(j.type_probability),
