@@ -105,6 +105,7 @@ fn only_one_open(
     let mut of_name = (0..groups.len()).filter(|&g| open(g, &named));
     match of_name.next() {
         Some(only) => of_name.next().is_none().then_some(only),
+        None if missed.iter().any(|m| m.after == i) => None,
         None => (0..groups.len()).find(|&g| open(g, &|_, j| j + 1 == i)),
     }
 }
@@ -332,11 +333,16 @@ mod tests {
         // Two stand open: the distance alone does not tell.
         let clips = [drawer(Action::Open, here), drawer(Action::Open, at(0.5).leak()), drawer(Action::Close, near)];
         assert_eq!(group(&clips, &[], &config).len(), 3);
-        // Closed already, and another name.
+        // Closed already, and called by another name right after it was opened.
         let closed = drawer(Action::Close, here);
         assert_eq!(group(&[drawer(Action::Open, here), closed, drawer(Action::Close, near)], &[], &config).len(), 2);
         let oven = Held { furniture: Some("oven"), ..drawer(Action::Close, near) };
-        assert_eq!(group(&[drawer(Action::Open, here), oven], &[], &config).len(), 2);
+        assert_eq!(group(&[drawer(Action::Open, here), oven], &[], &config).len(), 1);
+        // Unless that is elsewhere, something was opened since, or nobody knows.
+        assert_eq!(group(&[drawer(Action::Open, far), oven], &[], &config).len(), 2);
+        assert_eq!(group(&[drawer(Action::Open, here), drawer(Action::Open, far), oven], &[], &config).len(), 3);
+        let unseen = [Missed { after: 1, furniture: Some("drawer") }];
+        assert_eq!(group(&[drawer(Action::Open, here), oven], &unseen, &config).len(), 2);
         // A clip that nobody saw in between, unless it is of another name.
         let unseen = |furniture| [Missed { after: 1, furniture }];
         let clips = [drawer(Action::Open, here), drawer(Action::Close, near)];

@@ -314,6 +314,26 @@ fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
     })
 }
 
+/// How well a clip saw the closed part, to compare clips of one part.
+fn trust(clip: &ClipResult, config: &Config) -> f64 {
+    /// Handles stand off their fronts by this much more or less than is usual, metres.
+    const HANDLES_M: f64 = 0.04;
+    let (Some(face), Some(region), Some(trajectory)) = (&clip.face, &clip.region, &clip.trajectory) else {
+        return 0.0;
+    };
+    let off = face.coordinates(&region.grip)[2] - config.geometry.grip_standoff_m;
+    let seen = trajectory.closed_end_seen();
+    // A hand that was lost on its way from or to the closed place is before the front that it left, and near that of whatever
+    // it was lost at. So the less such a hand tells, the more its front's own points do. Of this the paper says nothing.
+    let (near, lost_before, least) = match config.inference.method {
+        InferenceMethod::Posterior => (1.0 / hands::grip_std_m(seen), !seen && off > 0.0, 0.0),
+        InferenceMethod::Paper => (1.0, false, 0.2),
+    };
+    let width = HANDLES_M.hypot(hands::grip_std_m(!lost_before));
+    let held = (-0.5 * (off / width).powi(2)).exp();
+    held * near * (least + face.support) * if clip.part.is_some() { 2.0 } else { 1.0 }
+}
+
 /// All candidates of all clips of one part, judged on every clip: the best explains all of them.
 ///
 /// `outlines`: of the part on the face of the clip that saw it best, one for each way in which it could move and left one, by
@@ -322,21 +342,7 @@ fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
 fn judged(group: &Group, reasoner: &dyn Reasoner, outlines: &[Rect]) -> Option<Judged> {
     let Group { recording, sketches, clips, members, config } = *group;
     // The clip that saw the closed part best gives the face, the grip and the part's outline.
-    let trust = |c: usize| -> f64 {
-        let clip = &clips[c];
-        let (Some(face), Some(region), Some(trajectory)) = (&clip.face, &clip.region, &clip.trajectory) else {
-            return 0.0;
-        };
-        let standoff = face.coordinates(&region.grip)[2];
-        let held = (-0.5 * ((standoff - config.geometry.grip_standoff_m) / 0.05).powi(2)).exp();
-        // A hand that was lost on its way from or to the closed place is near the front of whatever it was lost at. Of this
-        // the paper says nothing.
-        let near = match config.inference.method {
-            InferenceMethod::Posterior => 1.0 / hands::grip_std_m(trajectory.closed_end_seen()),
-            InferenceMethod::Paper => 1.0,
-        };
-        held * near * (0.2 + face.support) * if clip.part.is_some() { 2.0 } else { 1.0 }
-    };
+    let trust = |c: usize| trust(&clips[c], config);
     let &best = members
         .iter()
         .filter(|&&c| clips[c].joint.found().is_some())
@@ -521,6 +527,7 @@ fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around, round
 mod tests {
     use super::*;
     use crate::hands::Sample;
+    use crate::math::Vector;
     use crate::recording::Clip;
 
     /// Clips by narration and whether a hand was followed, in the order of time.
@@ -537,6 +544,38 @@ mod tests {
             out
         };
         said.iter().enumerate().map(clip).collect()
+    }
+
+    #[test]
+    fn the_front_of_a_part_is_that_of_the_clip_that_saw_it_closed_best() {
+        let config = Config::default();
+        // The grip stands `off` from a front of such support.
+        let clip = |off: f64, support: f64, seen: bool| {
+            let mut clip = clips(&[("open the oven", true)]).remove(0);
+            let [right, up, normal] = [Vector::x(), Vector::z(), -Vector::y()];
+            clip.face = Some(Face { center: Point::origin(), right, up, normal, extent: [[-1.0, 1.0]; 2], support });
+            let grip = Point::from(normal * (config.geometry.grip_standoff_m + off));
+            clip.region = Some(crate::localization::Region {
+                voxel_m: 0.05,
+                voxels: Vec::new(),
+                min_views: 1,
+                points: Vec::new(),
+                class: None,
+                local_frames: Vec::new(),
+                viewpoint: Point::origin(),
+                grip,
+            });
+            if let Some(hand) = &mut clip.trajectory {
+                hand.ends_seen = [seen; 2];
+            }
+            super::trust(&clip, &config)
+        };
+        // Lost before a large front, or at a small thing.
+        assert!(clip(0.15, 0.4, false) > 2.0 * clip(0.0, 0.08, false));
+        // Seen to take hold, of the two the latter; behind its front no hand is lost.
+        assert!(clip(0.0, 0.08, true) > 2.0 * clip(0.15, 0.4, true));
+        assert!(clip(0.0, 0.08, false) > 2.0 * clip(-0.15, 0.4, false));
+        assert!(clip(0.0, 0.4, true) > 2.0 * clip(0.0, 0.4, false));
     }
 
     #[test]
