@@ -245,7 +245,7 @@ block! {
         /// Clips whose closed grips are nearer than this can be one joint.
         merge_grip_m: f64 = 0.15, "m", "ours";
         /// A closing belongs to the only part of its name that stands open, if the hands' ways come nearer than this; where
-        /// either clip names nothing, to what the clip before it opened.
+        /// either clip names nothing, or nothing of that name stands open, to what the clip before it opened.
         merge_open_m: f64 = 0.5, "m", "ours";
         /// Clips whose front faces differ by less than this can be one joint.
         merge_angle_deg: f64 = 25.0, "deg", "ours";

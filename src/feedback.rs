@@ -234,10 +234,10 @@ fn rechosen(joint: &SceneJoint, against: &[Option<Refutation>], config: &Config)
         of.iter().filter(|h| inference::is_right(&answer.joint, &h.joint)).map(|h| h.share).sum()
     };
     // What was too unlikely to be listed and agrees with an answer that stays is counted, too. It is no more than is left of
-    // the type beside all that is listed: that of which agreed and no longer does, once it was fitted, does not.
+    // the type beside all that is listed: what was listed, agreed when it was judged and no longer does once fitted, is not it.
     let unlisted = if chosen == 0 {
         let listed: f64 = joint.hypotheses.iter().filter(|h| h.joint.kind == answer.joint.kind).map(|h| h.share).sum();
-        let beside = (joint.type_probability - listed).max(0.0);
+        let beside = (joint.hypotheses[0].type_share - listed).max(0.0);
         (joint.joint_probability - right(&joint.hypotheses)).clamp(0.0, beside)
     } else {
         0.0

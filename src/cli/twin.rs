@@ -224,11 +224,11 @@ pub fn summary(scene: &Scene, twin: &Twin, validation: &Validation) -> String {
         text += &format!("\n{reasons}");
     }
     let abstained: Vec<&pipeline::ClipResult> =
-        scene.clips.iter().filter(|c| c.joint.found().is_none() && scene.joint_of(&c.clip.clip).is_none()).collect();
+        scene.clips.iter().filter(|c| scene.joint_of(&c.clip.clip).is_none()).collect();
     if !abstained.is_empty() {
         text += &format!("\n{} of {} clips without an answer:\n", abstained.len(), scene.clips.len());
         for c in abstained {
-            text += &format!("  {}: {}\n", c.clip.clip, c.joint.reason().unwrap_or_default());
+            text += &format!("  {}: {}\n", c.clip.clip, c.joint.reason().unwrap_or("no joint was found for its part"));
         }
     }
     text

@@ -60,7 +60,8 @@ pub fn group(clips: &[Held], missed: &[Missed], config: &config::Inference) -> V
             .iter()
             .position(continues)
             .or_else(|| only_one_open(&groups, clips, missed, i, config))
-            .or_else(|| (0..groups.len()).filter(same).min_by(nearest));
+            .or_else(|| (0..groups.len()).filter(same).min_by(nearest))
+            .or_else(|| opened_before(&groups, clips, missed, i, config));
         match home {
             Some(home) => groups[home].push(i),
             None => groups.push(vec![i]),
@@ -71,8 +72,7 @@ pub fn group(clips: &[Held], missed: &[Missed], config: &config::Inference) -> V
 
 /// The part that clip `i` closes because no other of its name stands open within reach of the hand's way. Hands that were seen
 /// badly or in part only are far apart even on one part; what was left open decides then. Where the furniture has no name,
-/// only the clip before counts; so it does where nothing of that name stands open: people call one thing by two names sooner
-/// than they close what is shut.
+/// only the clip before counts.
 fn only_one_open(
     groups: &[Vec<usize>],
     clips: &[Held],
@@ -84,30 +84,46 @@ fn only_one_open(
     if clip.action != Action::Close {
         return None;
     }
-    let open = |g: usize, called: &dyn Fn(&Held, usize) -> bool| {
+    let mut open = (0..groups.len()).filter(|&g| {
         groups[g].last().is_some_and(|&j| {
             let before = &clips[j];
+            let named = match (before.furniture, clip.furniture) {
+                (Some(a), Some(b)) => a == b,
+                _ => j + 1 == i && names_agree(before, clip),
+            };
             // What nobody saw may have closed that one, or opened another.
             let unseen = missed
                 .iter()
                 .any(|m| (j + 1..=i).contains(&m.after) && m.furniture.zip(clip.furniture).is_none_or(|(a, b)| a == b));
             before.action == Action::Open
-                && called(before, j)
+                && named
                 && !unseen
                 && (j + 1 == i || faces_agree(before, clip, config))
                 && apart(before.path, clip.path) <= config.merge_open_m
         })
+    });
+    open.next().filter(|_| open.next().is_none())
+}
+
+/// The part that was opened right before clip `i` closes something within reach of it, if nothing that is called as in `i` was
+/// left open: people call one thing by two names sooner than they close what is shut.
+fn opened_before(
+    groups: &[Vec<usize>],
+    clips: &[Held],
+    missed: &[Missed],
+    i: usize,
+    config: &config::Inference,
+) -> Option<usize> {
+    let (clip, before) = (&clips[i], &clips[i.checked_sub(1)?]);
+    let left_open = |g: &Vec<usize>| {
+        let last = g.last().map(|&j| &clips[j]).filter(|c| c.action == Action::Open);
+        last.is_some_and(|c| c.furniture.zip(clip.furniture).is_some_and(|(a, b)| a == b))
     };
-    let named = |before: &Held, j: usize| match (before.furniture, clip.furniture) {
-        (Some(a), Some(b)) => a == b,
-        _ => j + 1 == i && names_agree(before, clip),
-    };
-    let mut of_name = (0..groups.len()).filter(|&g| open(g, &named));
-    match of_name.next() {
-        Some(only) => of_name.next().is_none().then_some(only),
-        None if missed.iter().any(|m| m.after == i) => None,
-        None => (0..groups.len()).find(|&g| open(g, &|_, j| j + 1 == i)),
-    }
+    let closes = (before.action, clip.action) == (Action::Open, Action::Close)
+        && apart(before.path, clip.path) <= config.merge_open_m
+        && !missed.iter().any(|m| m.after == i)
+        && !groups.iter().any(left_open);
+    groups.iter().position(|g| closes && g.last() == Some(&(i - 1)))
 }
 
 /// Shortest distance between the points of two paths; infinite where one has none.
@@ -341,6 +357,9 @@ mod tests {
         // Unless that is elsewhere, something was opened since, or nobody knows.
         assert_eq!(group(&[drawer(Action::Open, far), oven], &[], &config).len(), 2);
         assert_eq!(group(&[drawer(Action::Open, here), drawer(Action::Open, far), oven], &[], &config).len(), 3);
+        let [bin, far_oven] = [("bin", here), ("oven", far)]
+            .map(|(name, path)| Held { furniture: Some(name), ..drawer(Action::Open, path) });
+        assert_eq!(group(&[far_oven, bin, oven], &[], &config).len(), 3);
         let unseen = [Missed { after: 1, furniture: Some("drawer") }];
         assert_eq!(group(&[drawer(Action::Open, here), oven], &unseen, &config).len(), 2);
         // A clip that nobody saw in between, unless it is of another name.

@@ -134,7 +134,7 @@ fn forward(
         accepted[t] = believed;
         rejected_in_a_row = if believed { 0 } else { rejected_in_a_row + 1 };
         // Weight of the innovation a variance, and what is left of the variance.
-        let (share, left) = if believed { (1.0 / s, r / s) } else { (0.0, 1.0) };
+        let (share, left, innovation) = if believed { (1.0 / s, r / s, innovation) } else { (0.0, 1.0, f64x4::ZERO) };
         steps.push(Step {
             position: position + innovation * (predicted.p * share),
             velocity: velocity + innovation * (predicted.c * share),
@@ -264,6 +264,32 @@ mod tests {
         for t in 0..n {
             assert!((solution[2 * t] - out.positions[t].x).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn a_restart_cuts_the_chain() {
+        let (times, truth) = pull();
+        let away = Vector::new(0.0, 1.0, 0.0);
+        let seen: Vec<Point> = truth.iter().enumerate().map(|(i, p)| if i < 12 { *p } else { p + away }).collect();
+        let out = smooth(&times, &seen, &filter());
+        assert_eq!(out.accepted, (0..31).map(|i| !(12..15).contains(&i)).collect::<Vec<_>>());
+        let alone = |r: std::ops::Range<usize>| smooth(&times[r.clone()], &seen[r], &filter()).positions;
+        // What was rejected follows what it was rejected by.
+        assert_eq!(out.positions[15..], alone(15..31));
+        assert!(out.positions[..15].iter().all(|p| p.y.abs() < 1e-9), "{:?}", out.positions);
+    }
+
+    #[test]
+    fn what_is_rejected_leaves_nothing_and_equal_times_are_no_step() {
+        let (times, mut seen) = pull();
+        seen[15].z = f64::NAN;
+        let out = smooth(&times, &seen, &filter());
+        assert!(!out.accepted[15] && out.positions.iter().all(|p| p.coords.iter().all(|x| x.is_finite())));
+        let twice = smooth(&[0.0, 0.0], &[seen[0], seen[1]], &filter()).positions;
+        assert!(
+            (twice[0] - twice[1]).norm() < 1e-12 && (twice[0] - nalgebra::center(&seen[0], &seen[1])).norm() < 1e-12
+        );
+        assert_eq!(smooth(&[0.0], &seen[..1], &filter()).positions, seen[..1]);
     }
 
     #[test]

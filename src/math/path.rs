@@ -124,6 +124,13 @@ mod tests {
             (0..11).map(|i| Line { point: Point::new(0.1 * f64::from(i), 0.0, 1.0), ..axis }).collect();
         let one_by_one: Vec<_> = lines.iter().filter_map(|l| about_line(&arc, l)).collect();
         assert_eq!(about_lines(&arc, &lines), one_by_one);
+        // By hand, off the axis, in the chunk that is not full.
+        let distances: Vec<f64> = arc.iter().map(|p| lines[9].distance(p)).collect();
+        let mean = distances.iter().sum::<f64>() / 20.0;
+        let variance = distances.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / 20.0;
+        assert!(
+            (one_by_one[9].radius - mean).abs() < 1e-12 && (one_by_one[9].radial_variance - variance).abs() < 1e-12
+        );
         assert!(about_lines(&[], &lines).is_empty() && about_lines(&arc, &[]).is_empty());
         assert_eq!(torus_inliers(&arc, &axis, |_| 0.02), Some(1.0));
         let pull: Vec<Point> = (0..20).map(|i| Point::new(0.02 * f64::from(i), 1.0, 0.5)).collect();

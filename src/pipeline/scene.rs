@@ -72,7 +72,9 @@ pub(super) fn merge(
     }
     if config.inference.merge_clips {
         for told in told(clips) {
-            if let Some(joint) = joints.iter_mut().find(|j| j.clips.contains(&told.with)) {
+            if let Some(joint) = joints.iter_mut().find(|j| j.clips.contains(&told.with))
+                && in_turn(&told, &joint.clips, clips)
+            {
                 joint.told.push(told);
             }
         }
@@ -85,7 +87,13 @@ pub(super) fn merge(
 fn told(clips: &[ClipResult]) -> Vec<Told> {
     let mut moving: Vec<(&ClipResult, narration::Reading)> = clips
         .iter()
-        .map(|clip| (clip, narration::read(&clip.clip)))
+        .map(|clip| {
+            let reading = narration::read(&clip.clip);
+            (
+                clip,
+                narration::Reading { action: clip.trajectory.as_ref().map(|t| t.action).or(reading.action), ..reading },
+            )
+        })
         .filter(|(clip, reading)| clip.trajectory.is_some() || reading.moves_joint == Some(true))
         .collect();
     moving.sort_by_key(|(clip, _)| clip.clip.start_frame);
@@ -106,6 +114,22 @@ fn told(clips: &[ClipResult]) -> Vec<Told> {
         .collect()
 }
 
+/// Whether a part is opened and closed in turn with that clip among those that show it.
+fn in_turn(told: &Told, shown: &[String], clips: &[ClipResult]) -> bool {
+    let of = |name: &str| clips.iter().find(|c| c.clip.clip == name);
+    let (Some(lost), Some(with)) = (of(&told.clip), of(&told.with)) else { return false };
+    let Some(action) = with.trajectory.as_ref().map(|t| t.action) else { return false };
+    let later = with.clip.start_frame <= lost.clip.start_frame;
+    let mut others: Vec<(usize, Action)> = shown
+        .iter()
+        .filter_map(|name| of(name))
+        .filter(|c| c.clip.clip != told.with && (c.clip.start_frame >= with.clip.start_frame) == later)
+        .filter_map(|c| Some((c.clip.start_frame.abs_diff(with.clip.start_frame), c.trajectory.as_ref()?.action)))
+        .collect();
+    others.sort_by_key(|(frames, _)| *frames);
+    others.first().is_none_or(|(_, next)| *next == action)
+}
+
 /// What a narration says that names the furniture.
 fn naming(clip: &ClipResult) -> Option<narration::Reading> {
     Some(narration::read(&clip.clip)).filter(narration::Reading::names_furniture)
@@ -113,11 +137,13 @@ fn naming(clip: &ClipResult) -> Option<narration::Reading> {
 
 /// Clips that move something without a hand that was followed: how many of `seen` come before each, and the furniture's name.
 fn unseen(seen: &[(usize, &ClipResult, &Trajectory)], clips: &[ClipResult]) -> Vec<(usize, Option<String>)> {
-    let before = |c: &ClipResult| seen.iter().filter(|(_, s, _)| s.clip.start_frame <= c.clip.start_frame).count();
+    let order = |i: usize| (clips[i].clip.start_frame, i);
+    let before = |i: usize| seen.iter().filter(|(s, ..)| order(*s) < order(i)).count();
     clips
         .iter()
-        .filter(|c| c.trajectory.is_none() && narration::read(&c.clip).moves_joint == Some(true))
-        .map(|c| (before(c), naming(c).and_then(|r| r.furniture)))
+        .enumerate()
+        .filter(|(_, c)| c.trajectory.is_none() && narration::read(&c.clip).moves_joint == Some(true))
+        .map(|(i, c)| (before(i), naming(c).and_then(|r| r.furniture)))
         .collect()
 }
 
@@ -539,8 +565,8 @@ mod tests {
             let mut out = ClipResult::unanswered(clip, "no hand".to_owned());
             let at = Point::origin();
             let samples = vec![Sample { frame: 0, time_secs: 0.0, observed: at, smoothed: at, accepted: true }];
-            out.trajectory =
-                hand.then_some(Trajectory { side: None, samples, action: Action::Open, ends_seen: [true; 2] });
+            let action = narration::read(&out.clip).action.unwrap_or(Action::Open);
+            out.trajectory = hand.then_some(Trajectory { side: None, samples, action, ends_seen: [true; 2] });
             out
         };
         said.iter().enumerate().map(clip).collect()
@@ -598,5 +624,15 @@ mod tests {
         ] {
             assert!(told(&said).is_empty(), "{said:?}");
         }
+        // What is shut already is not closed, what stands open not opened.
+        let tied = |said: &[(&str, bool)], shown: &[&str]| {
+            let clips = clips(said);
+            let shown: Vec<String> = shown.iter().map(|&s| s.to_owned()).collect();
+            super::told(&clips).iter().filter(|t| in_turn(t, &shown, &clips)).count()
+        };
+        let open_twice = [("open the oven", true), ("open it", false), ("close the oven", true)];
+        let shut_twice = [("open the oven", true), ("close it", false), ("close the oven", true)];
+        assert_eq!((tied(&open_twice, &["0", "2"]), tied(&open_twice, &["2"])), (0, 1));
+        assert_eq!((tied(&shut_twice, &["0", "2"]), tied(&shut_twice, &["0"])), (0, 1));
     }
 }

@@ -129,7 +129,8 @@ fn stage(clip: &ClipResult) -> Stage {
     }
 }
 
-/// One row a clip: the scene's joint where the clip shows one, its own range, the twin's box.
+/// One row a clip: the scene's joint where the clip shows one or is told to move it, the range of the clip that shows it, the
+/// twin's box.
 #[must_use]
 pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
     let rows = scene
@@ -161,7 +162,7 @@ pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
             let part = twin.furniture.iter().map(|f| &f.part).find(|p| p.id == joint.id);
             // A joint that could not be built is still an answer.
             let phi = part.map_or(joint.joint, |p| p.joint.articulation);
-            let path = c.trajectory.as_ref().map_or_else(|| vec![joint.grip], |t| t.positions());
+            let path = c.trajectory.as_ref().map(crate::hands::Trajectory::positions).unwrap_or_default();
             (row.reason, row.stage) = (None, None);
             row.kind = Some(phi.kind);
             row.axis = Some(phi.axis);
