@@ -4,6 +4,7 @@ mod clip;
 mod refit;
 mod room;
 mod scene;
+mod told;
 
 use std::collections::BTreeMap;
 
