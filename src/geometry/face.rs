@@ -94,7 +94,8 @@ pub struct Surroundings<'a> {
 
 /// Fits the face that the grip stands off, oriented to the viewpoint. `None` where no plane is near the grip.
 ///
-/// A plane is the better a face the more of the surroundings lie on it, the better the grip stands off it as hands hold
+/// A plane is the better a face the more of the surroundings lie on it (squared: a front is most of what is seen around a hand
+/// that holds it, while any plane has a few points), the better the grip stands off it as hands hold
 /// handles, the more the motion leaves it, the nearer it is to upright or level and to the room's directions, and as the
 /// furniture's name has it level or not.
 #[must_use]
@@ -109,7 +110,7 @@ pub fn fit(around: &Surroundings, config: &config::Geometry, seed: u64) -> Optio
     let tolerance = config.face_tolerance_m;
     let share =
         |plane: &Plane| near.iter().filter(|p| plane.height(p).abs() <= tolerance).count() as f64 / near.len() as f64;
-    let score = |plane: &Plane| share(plane) * face_prior(plane, around, config);
+    let score = |plane: &Plane| share(plane).powi(2) * face_prior(plane, around, config);
     let refine = |plane: Plane| {
         let inliers: Vec<Point> = near.iter().copied().filter(|p| plane.height(p).abs() <= tolerance).collect();
         Plane::fit(&inliers).map_or(plane, |p| p.facing(&around.viewpoint))

@@ -286,24 +286,45 @@ fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
     })
 }
 
-/// How well a clip saw the closed part, to compare clips of one part.
-fn trust(clip: &ClipResult, config: &Config) -> f64 {
-    /// Handles stand off their fronts by this much more or less than is usual, metres.
-    const HANDLES_M: f64 = 0.04;
-    let (Some(face), Some(region), Some(trajectory)) = (&clip.face, &clip.region, &clip.trajectory) else {
+/// How well a clip saw the closed part, to compare clips of one part: how well its front bears out where the clip's own hand and
+/// those of the part's other clips were when the part was closed, and how much of what is near lies on it. Of the others the paper
+/// says nothing.
+fn trust(clip: &ClipResult, hands: &[&Trajectory], config: &Config) -> f64 {
+    let (Some(face), Some(region), Some(own)) = (&clip.face, &clip.region, &clip.trajectory) else {
         return 0.0;
     };
-    let off = face.coordinates(&region.grip)[2] - config.geometry.grip_standoff_m;
-    let seen = trajectory.closed_end_seen();
-    // A hand that was lost on its way from or to the closed place is before the front that it left, and near that of whatever
-    // it was lost at. So the less such a hand tells, the more its front's own points do. Of this the paper says nothing.
-    let (near, lost_before, least) = match config.inference.method {
-        InferenceMethod::Posterior => (1.0 / hands::grip_std_m(seen), !seen && off > 0.0, 0.0),
-        InferenceMethod::Paper => (1.0, false, 0.2),
-    };
-    let width = HANDLES_M.hypot(hands::grip_std_m(!lost_before));
-    let held = (-0.5 * (off / width).powi(2)).exp();
-    held * near * (least + face.support) * if clip.part.is_some() { 2.0 } else { 1.0 }
+    let off = |grip: &Point| face.coordinates(grip)[2] - config.geometry.grip_standoff_m;
+    let moved = if clip.part.is_some() { 2.0 } else { 1.0 };
+    match config.inference.method {
+        InferenceMethod::Paper => (-0.5 * (off(&region.grip) / HANDLES_M).powi(2)).exp() * (0.2 + face.support) * moved,
+        InferenceMethod::Posterior => {
+            let seen = own.closed_end_seen();
+            // The face was looked for near its own clip's hand, any other hand may have been lost all along the way.
+            let held = at_front(off(&own.closed_grip()), seen, hands::grip_std_m(false));
+            let others = hands.iter().filter(|t| !std::ptr::eq(**t, own));
+            let borne_out: f64 = others.map(|t| at_front(off(&t.closed_grip()), t.closed_end_seen(), LOST_M)).product();
+            // A front is most of what is seen around a hand that holds it: half as much of a plane is more than half as bad.
+            held / hands::grip_std_m(seen) * borne_out * face.support.powi(2) * moved
+        }
+    }
+}
+
+/// Handles stand off their fronts by this much more or less than is usual, metres.
+const HANDLES_M: f64 = 0.04;
+/// A hand that was lost may be as far before the front as parts open, metres.
+const LOST_M: f64 = 0.3;
+
+/// Likelihood (1/m) of a hand's distance `off` from where it stands off its front when it holds a closed part, metres. Behind a
+/// front is no hand; one that was lost, up to about `lost_m` before it, and so is one of five that seemed to take hold or let go,
+/// as flags of contacts are wrong, too.
+fn at_front(off: f64, seen: bool, lost_m: f64) -> f64 {
+    const WRONG: f64 = 0.2;
+    /// Whatever else happens, 1/m.
+    const ODD: f64 = 0.02;
+    let [near, far] = [true, false].map(|seen| HANDLES_M.hypot(if seen { hands::grip_std_m(true) } else { lost_m }));
+    let bell = |std_m: f64| (-0.5 * (off / std_m).powi(2)).exp();
+    let lost = 2.0 / (near + far) * bell(if off > 0.0 { far } else { near });
+    ODD + if seen { (1.0 - WRONG) * bell(near) / near + WRONG * lost } else { lost }
 }
 
 /// All candidates of all clips of one part, judged on every clip: the best explains all of them.
@@ -314,7 +335,8 @@ fn trust(clip: &ClipResult, config: &Config) -> f64 {
 fn judged(group: &Group, reasoner: &dyn Reasoner, outlines: &[Rect]) -> Option<Judged> {
     let Group { recording, sketches, clips, members, config } = *group;
     // The clip that saw the closed part best gives the face, the grip and the part's outline.
-    let trust = |c: usize| trust(&clips[c], config);
+    let hands: Vec<&Trajectory> = members.iter().filter_map(|&c| clips[c].trajectory.as_ref()).collect();
+    let trust = |c: usize| trust(&clips[c], &hands, config);
     let &best = members
         .iter()
         .filter(|&&c| clips[c].joint.found().is_some())
@@ -504,12 +526,13 @@ mod tests {
     #[test]
     fn the_front_of_a_part_is_that_of_the_clip_that_saw_it_closed_best() {
         let config = Config::default();
-        // The grip stands `off` from a front of such support.
-        let clip = |off: f64, support: f64, seen: bool| {
+        // A clip's front of such support, so far before or behind the others', from which its grip stands `off`.
+        let clip = |front: f64, off: f64, support: f64, seen: bool| {
             let mut clip = clips(&[("open the oven", true)]).remove(0);
             let [right, up, normal] = [Vector::x(), Vector::z(), -Vector::y()];
-            clip.face = Some(Face { center: Point::origin(), right, up, normal, extent: [[-1.0, 1.0]; 2], support });
-            let grip = Point::from(normal * (config.geometry.grip_standoff_m + off));
+            let center = Point::from(normal * front);
+            clip.face = Some(Face { center, right, up, normal, extent: [[-1.0, 1.0]; 2], support });
+            let grip = center + normal * (config.geometry.grip_standoff_m + off);
             clip.region = Some(crate::localization::Region {
                 voxel_m: 0.05,
                 voxels: Vec::new(),
@@ -522,14 +545,23 @@ mod tests {
             });
             if let Some(hand) = &mut clip.trajectory {
                 hand.ends_seen = [seen; 2];
+                hand.samples[0].smoothed = grip;
             }
-            super::trust(&clip, &config)
+            clip
+        };
+        let alone = |front, off, support, seen| {
+            let clip = clip(front, off, support, seen);
+            trust(&clip, &[clip.trajectory.as_ref().unwrap()], &config)
         };
         // Lost before a large front, or at a small thing.
-        assert!(clip(0.15, 0.4, false) > 2.0 * clip(0.0, 0.08, false));
-        // Seen to take hold, of the two the latter; behind its front no hand is lost.
-        assert!(clip(0.0, 0.08, true) > 2.0 * clip(0.15, 0.4, true));
-        assert!(clip(0.0, 0.08, false) > 2.0 * clip(-0.15, 0.4, false));
-        assert!(clip(0.0, 0.4, true) > 2.0 * clip(0.0, 0.4, false));
+        assert!(alone(0.0, 0.15, 0.4, false) > 2.0 * alone(0.0, 0.0, 0.08, false));
+        // Seen to take hold, of fronts as large the latter; behind its front no hand is lost.
+        assert!(alone(0.0, 0.0, 0.4, true) > 2.0 * alone(0.0, 0.15, 0.4, true));
+        assert!(alone(0.0, 0.0, 0.08, false) > 2.0 * alone(0.0, -0.15, 0.4, false));
+        assert!(alone(0.0, 0.0, 0.4, true) > 2.0 * alone(0.0, 0.0, 0.4, false));
+        // Two clips of a part: a hand that is lost before the other's front says nothing against it, one behind it does.
+        let two = [clip(0.0, 0.0, 0.4, false), clip(0.3, 0.0, 0.4, false)];
+        let hands: Vec<&Trajectory> = two.iter().filter_map(|c| c.trajectory.as_ref()).collect();
+        assert!(trust(&two[0], &hands, &config) > 4.0 * trust(&two[1], &hands, &config));
     }
 }
