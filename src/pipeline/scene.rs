@@ -286,45 +286,51 @@ fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
     })
 }
 
-/// How well a clip saw the closed part, to compare clips of one part: how well its front bears out where the clip's own hand and
-/// those of the part's other clips were when the part was closed, and how much of what is near lies on it. Of the others the paper
-/// says nothing.
-fn trust(clip: &ClipResult, hands: &[&Trajectory], config: &Config) -> f64 {
-    let (Some(face), Some(region), Some(own)) = (&clip.face, &clip.region, &clip.trajectory) else {
+/// How well a clip saw the closed part, to compare clips of one part: how well its front bears out where the hands of all of the
+/// part's clips were when it was closed (grips, and whether they were seen to take hold or let go there), and how much of what is
+/// near lies on it. Of the other clips' hands the paper says nothing.
+fn trust(clip: &ClipResult, grips: &[(Point, bool)], config: &Config) -> f64 {
+    let (Some(face), Some(region), Some(hand)) = (&clip.face, &clip.region, &clip.trajectory) else {
         return 0.0;
     };
     let off = |grip: &Point| face.coordinates(grip)[2] - config.geometry.grip_standoff_m;
     let moved = if clip.part.is_some() { 2.0 } else { 1.0 };
     match config.inference.method {
-        InferenceMethod::Paper => (-0.5 * (off(&region.grip) / HANDLES_M).powi(2)).exp() * (0.2 + face.support) * moved,
+        InferenceMethod::Paper => at_handle(off(&region.grip)) * (0.2 + face.support) * moved,
         InferenceMethod::Posterior => {
-            let seen = own.closed_end_seen();
-            // The face was looked for near its own clip's hand, any other hand may have been lost all along the way.
-            let held = at_front(off(&own.closed_grip()), seen, hands::grip_std_m(false));
-            let others = hands.iter().filter(|t| !std::ptr::eq(**t, own));
-            let borne_out: f64 = others.map(|t| at_front(off(&t.closed_grip()), t.closed_end_seen(), LOST_M)).product();
-            // A front is most of what is seen around a hand that holds it: half as much of a plane is more than half as bad.
-            held / hands::grip_std_m(seen) * borne_out * face.support.powi(2) * moved
+            let borne_out: f64 = grips.iter().map(|(grip, seen)| at_front(off(grip), *seen)).product();
+            // A front is most of what is seen around a hand that holds it: half the support counts a quarter.
+            let near = 1.0 / hands::grip_std_m(hand.closed_end_seen());
+            borne_out * near * face.support.powi(2) * moved
         }
     }
 }
 
-/// Handles stand off their fronts by this much more or less than is usual, metres.
-const HANDLES_M: f64 = 0.04;
-/// A hand that was lost may be as far before the front as parts open, metres.
-const LOST_M: f64 = 0.3;
+/// Standard deviation of how far hands that hold closed parts are from where handles usually stand off their fronts, metres: of
+/// handles, and of hands.
+fn at_handle_std_m() -> f64 {
+    const HANDLES_M: f64 = 0.04;
+    HANDLES_M.hypot(hands::grip_std_m(true))
+}
 
-/// Likelihood (1/m) of a hand's distance `off` from where it stands off its front when it holds a closed part, metres. Behind a
-/// front is no hand; one that was lost, up to about `lost_m` before it, and so is one of five that seemed to take hold or let go,
-/// as flags of contacts are wrong, too.
-fn at_front(off: f64, seen: bool, lost_m: f64) -> f64 {
+/// How likely such a distance is against none.
+fn at_handle(off: f64) -> f64 {
+    (-0.5 * (off / at_handle_std_m()).powi(2)).exp()
+}
+
+/// The same of any hand at the closed end of its motion, where it was or was not `seen` to take hold or let go. Behind its front
+/// there is no hand. A lost one may be as far before it as parts open, and so may one of five that seemed to be seen, as flags of
+/// contacts are wrong, too.
+fn at_front(off: f64, seen: bool) -> f64 {
+    /// Standard deviation of what parts open, metres.
+    const LOST_M: f64 = 0.3;
     const WRONG: f64 = 0.2;
-    /// Whatever else happens, 1/m.
+    /// Hands of other parts, wrong depth: anywhere within a metre.
     const ODD: f64 = 0.02;
-    let [near, far] = [true, false].map(|seen| HANDLES_M.hypot(if seen { hands::grip_std_m(true) } else { lost_m }));
-    let bell = |std_m: f64| (-0.5 * (off / std_m).powi(2)).exp();
-    let lost = 2.0 / (near + far) * bell(if off > 0.0 { far } else { near });
-    ODD + if seen { (1.0 - WRONG) * bell(near) / near + WRONG * lost } else { lost }
+    let near = at_handle_std_m();
+    let bell = if off > 0.0 { (-0.5 * (off / LOST_M).powi(2)).exp() } else { at_handle(off) };
+    let lost = 2.0 * near / (near + LOST_M) * bell;
+    ODD * near + if seen { (1.0 - WRONG) * at_handle(off) + WRONG * lost } else { lost }
 }
 
 /// All candidates of all clips of one part, judged on every clip: the best explains all of them.
@@ -335,8 +341,8 @@ fn at_front(off: f64, seen: bool, lost_m: f64) -> f64 {
 fn judged(group: &Group, reasoner: &dyn Reasoner, outlines: &[Rect]) -> Option<Judged> {
     let Group { recording, sketches, clips, members, config } = *group;
     // The clip that saw the closed part best gives the face, the grip and the part's outline.
-    let hands: Vec<&Trajectory> = members.iter().filter_map(|&c| clips[c].trajectory.as_ref()).collect();
-    let trust = |c: usize| trust(&clips[c], &hands, config);
+    let grips: Vec<(Point, bool)> = group.shown().iter().map(|(_, t)| (t.closed_grip(), t.closed_end_seen())).collect();
+    let trust = |c: usize| trust(&clips[c], &grips, config);
     let &best = members
         .iter()
         .filter(|&&c| clips[c].joint.found().is_some())
@@ -375,19 +381,21 @@ fn judged(group: &Group, reasoner: &dyn Reasoner, outlines: &[Rect]) -> Option<J
             let own_grip = trajectory.closed_grip();
             let known: Vec<Option<Rect>> =
                 if outlines.is_empty() { vec![clips[best].part] } else { outlines.iter().copied().map(Some).collect() };
-            let mut contexts: Vec<(Face, Option<Rect>, Point)> = Vec::new();
+            let [best_std_m, own_std_m] =
+                [best, c].map(|c| hands::grip_std_m(clips[c].trajectory.as_ref().is_some_and(Trajectory::closed_end_seen)));
+            let mut contexts: Vec<(Face, Option<Rect>, Point, f64)> = Vec::new();
             for rect in known {
-                contexts.extend(face.map(|f| (f, rect, grip)));
+                contexts.extend(face.map(|f| (f, rect, grip, best_std_m)));
                 // Of the best clip all of these are one.
-                contexts.extend(face.filter(|_| c != best).map(|f| (f, rect, own_grip)));
+                contexts.extend(face.filter(|_| c != best).map(|f| (f, rect, own_grip, own_std_m)));
             }
-            contexts.extend(own.filter(|_| c != best).map(|f| (f, clips[c].part, own_grip)));
-            let contexts: Vec<(Sights, Point)> =
-                contexts.iter().map(|(f, rect, grip)| (Sights::of(f, rect.as_ref(), &open), *grip)).collect();
-            let grip_std_m = hands::grip_std_m(trajectory.closed_end_seen());
+            contexts.extend(own.filter(|_| c != best).map(|f| (f, clips[c].part, own_grip, own_std_m)));
             let agreement = contexts
                 .iter()
-                .map(|(s, grip)| sights::agreements(s, pooled.iter().map(|k| &k.joint), grip, grip_std_m))
+                .map(|(f, rect, grip, std_m)| {
+                    let sights = Sights::of(f, rect.as_ref(), &open);
+                    sights::agreements(&sights, pooled.iter().map(|k| &k.joint), grip, *std_m)
+                })
                 .reduce(|best, next| best.iter().zip(&next).map(|(a, b)| a.max(*b)).collect())
                 .unwrap_or_else(|| vec![0.0; pooled.len()]);
             answers.push(reasoner.answer(&Question {
