@@ -186,3 +186,60 @@ pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
         .collect();
     Predictions { predictions: rows }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::articulation::JointKind;
+    use crate::math::Vector;
+    use crate::pipeline::SceneJoint;
+    use crate::recording::Clip;
+
+    /// A drawer seen to open by 30 cm, told to close, and a clip that nobody can place.
+    #[test]
+    fn a_told_clip_has_the_row_of_the_clip_that_shows_its_joint() {
+        let clip = |name: &str| {
+            let [narration, verb, noun] = [(); 3].map(|()| String::new());
+            let clip = Clip { clip: name.to_owned(), start_frame: 0, end_frame: 9, narration, verb, noun };
+            ClipResult::unanswered(clip, "no hand was detected in the clip".to_owned())
+        };
+        let joint = Articulation { kind: JointKind::Prismatic, axis: -Vector::y(), origin: Point::origin() };
+        let drawer = SceneJoint {
+            id: "joint_0".to_owned(),
+            joint,
+            clips: vec!["other".to_owned(), "seen".to_owned()],
+            told: vec![Told { clip: "told".to_owned(), with: "seen".to_owned() }],
+            furniture: None,
+            type_probability: 0.9,
+            joint_probability: 0.8,
+            uncertainty: None,
+            grip: Point::origin(),
+            face: None,
+            part: None,
+            observed_range: 0.3,
+            moved: vec![0.2, 0.3],
+            hypotheses: vec![],
+        };
+        let scene = Scene {
+            recording: "kitchen".to_owned(),
+            manhattan: None,
+            depth_factors: crate::recording::DepthFactors::default(),
+            clips: ["other", "seen", "told", "lost"].map(clip).to_vec(),
+            joints: vec![drawer],
+            surroundings: None,
+        };
+        let twin =
+            Twin { name: String::new(), density_kg_per_m3: 600.0, furniture: vec![], room: vec![], left_out: vec![] };
+        let rows = predictions(&scene, &twin).predictions;
+        let (told, seen, lost) = (&rows[2], &rows[1], &rows[3]);
+        assert_eq!((told.kind, told.range, told.joint_confidence), (Some(JointKind::Prismatic), Some(0.3), Some(0.8)));
+        assert_eq!(Prediction { clip: seen.clip.clone(), ..told.clone() }, *seen);
+        // Its own reason for having no answer is none any more; that of a clip that nothing is told of stays.
+        assert!(told.reason.is_none() && told.stage.is_none() && told.contact_pivot.is_none());
+        assert!(lost.kind.is_none() && lost.stage == Some(Stage::Hands) && lost.reason.is_some());
+        let written: serde_json::Value = serde_json::from_str(&articulations(&scene, "words").unwrap()).unwrap();
+        assert_eq!(written["joints"][0]["told"][0]["clip"], "told");
+        assert_eq!(written["clips"][2]["joint_of_scene"], "joint_0");
+        assert!(written["clips"][3]["joint_of_scene"].is_null());
+    }
+}
