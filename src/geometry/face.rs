@@ -95,9 +95,8 @@ pub struct Surroundings<'a> {
 /// Fits the face that the grip stands off, oriented to the viewpoint. `None` where no plane is near the grip.
 ///
 /// A plane is the better a face the more of the surroundings lie on it (squared: a front is most of what is seen around a hand
-/// that holds it, while any plane has a few points), the better the grip stands off it as hands hold
-/// handles, the more the motion leaves it, the nearer it is to upright or level and to the room's directions, and as the
-/// furniture's name has it level or not.
+/// that holds it, while any plane has a few points), the better the grip stands off it as hands hold handles, the more the motion
+/// leaves it, the nearer it is to upright or level and to the room's directions, and as the furniture's name has it level or not.
 #[must_use]
 pub fn fit(around: &Surroundings, config: &config::Geometry, seed: u64) -> Option<Face> {
     let grip = around.grips[0];

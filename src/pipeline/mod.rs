@@ -1,6 +1,7 @@
 //! The whole paper on one screen: every step in order, every intermediate kept.
 
 mod clip;
+mod closed;
 mod refit;
 mod room;
 mod scene;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::clip::{self, part_shape};
+use super::closed::{Grip, best_seen};
 use super::refit;
 use super::{ClipResult, Hypothesis, SceneJoint, told};
 use crate::articulation::{Articulation, JointKind};
@@ -286,85 +287,6 @@ fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
     })
 }
 
-/// What parts open, standard deviation, metres: so far before its front a hand of another clip may have been lost.
-const TRAVEL_M: f64 = 0.3;
-
-/// A hand at the closed end of its motion.
-#[derive(Clone, Copy)]
-struct Grip {
-    /// Index of its clip.
-    clip: usize,
-    /// World.
-    at: Point,
-    /// Whether it was seen to take hold or let go there.
-    seen: bool,
-}
-
-impl Grip {
-    fn of(clips: &[ClipResult], clip: usize) -> Option<Self> {
-        let hand = clips[clip].trajectory.as_ref()?;
-        Some(Self { clip, at: hand.closed_grip(), seen: hand.closed_end_seen() })
-    }
-
-    /// Standard deviation along the motion, metres.
-    fn std_m(&self) -> f64 {
-        hands::grip_std_m(self.seen)
-    }
-}
-
-/// How well a clip saw the closed part, to compare clips of one part: how well its front bears out where the hands of all of the
-/// part's clips were when it was closed, and how much of what is near lies on it. Of the other clips' hands the paper says nothing.
-fn trust(clips: &[ClipResult], clip: usize, grips: &[Grip], config: &Config) -> f64 {
-    let (Some(face), Some(own)) = (&clips[clip].face, Grip::of(clips, clip)) else {
-        return 0.0;
-    };
-    let off = |grip: &Grip| face.coordinates(&grip.at)[2] - config.geometry.grip_standoff_m;
-    let moved = if clips[clip].part.is_some() { 2.0 } else { 1.0 };
-    match config.inference.method {
-        InferenceMethod::Paper => at_handle(off(&own)) * (0.2 + face.support) * moved,
-        InferenceMethod::Posterior => {
-            // The face was looked for near its own hand.
-            let lost_m = |grip: &Grip| if grip.clip == clip { hands::grip_std_m(false) } else { TRAVEL_M };
-            let borne_out: f64 = grips.iter().map(|g| at_front(off(g), g.seen, lost_m(g))).product();
-            // A front is most of what is seen around a hand that holds it: half the support counts a quarter.
-            borne_out / own.std_m() * face.support.powi(2) * moved
-        }
-    }
-}
-
-/// Standard deviation of how far hands that hold closed parts are from where handles usually stand off their fronts, metres: of
-/// handles, and of hands.
-fn at_handle_std_m() -> f64 {
-    const HANDLES_M: f64 = 0.04;
-    HANDLES_M.hypot(hands::grip_std_m(true))
-}
-
-/// How likely such a distance is against none.
-fn at_handle(off: f64) -> f64 {
-    (-0.5 * (off / at_handle_std_m()).powi(2)).exp()
-}
-
-/// The same of any hand at the closed end of its motion, where it was or was not `seen` to take hold or let go. Behind its front
-/// there is no hand. A lost one may be before it by a standard deviation of `lost_m`, and so may one of five that seemed to be
-/// seen, as flags of contacts are wrong, too.
-fn at_front(off: f64, seen: bool, lost_m: f64) -> f64 {
-    const WRONG: f64 = 0.2;
-    /// Hands of other parts, wrong depth: anywhere within a metre.
-    const ODD: f64 = 0.02;
-    let near = at_handle_std_m();
-    let bell = if off > 0.0 { (-0.5 * (off / lost_m.max(near)).powi(2)).exp() } else { at_handle(off) };
-    let lost = 2.0 * near / (near + lost_m.max(near)) * bell;
-    ODD * near + if seen { (1.0 - WRONG) * at_handle(off) + WRONG * lost } else { lost }
-}
-
-/// Of a part's clips with an answer the one that saw it closed best.
-fn best_seen(clips: &[ClipResult], members: &[usize], config: &Config) -> Option<usize> {
-    let grips: Vec<Grip> = members.iter().filter_map(|&c| Grip::of(clips, c)).collect();
-    let answered = members.iter().filter(|&&c| clips[c].joint.found().is_some());
-    let trusted = answered.map(|&c| (c, trust(clips, c, &grips, config)));
-    trusted.reduce(|best, next| if next.1 > best.1 { next } else { best }).map(|(best, _)| best)
-}
-
 /// All candidates of all clips of one part, judged on every clip: the best explains all of them.
 ///
 /// `outlines`: of the part on the face of the clip that saw it best, one for each way in which it could move and left one, by
@@ -376,6 +298,7 @@ fn judged(group: &Group, reasoner: &dyn Reasoner, outlines: &[Rect]) -> Option<J
     let best = best_seen(clips, members, config)?;
     let best_joint = clips[best].joint.found()?;
     let grip = best_joint.grip;
+    let best_std_m = Grip::of(clips, best)?.std_m();
     let face = clips[best].face;
     let (mut joint, mut type_probability) = (best_joint.joint, best_joint.type_probability);
     let mut joint_probability = best_joint.joint_probability;
@@ -408,8 +331,7 @@ fn judged(group: &Group, reasoner: &dyn Reasoner, outlines: &[Rect]) -> Option<J
             let own_grip = trajectory.closed_grip();
             let known: Vec<Option<Rect>> =
                 if outlines.is_empty() { vec![clips[best].part] } else { outlines.iter().copied().map(Some).collect() };
-            let [best_std_m, own_std_m] = [best, c]
-                .map(|c| hands::grip_std_m(clips[c].trajectory.as_ref().is_some_and(Trajectory::closed_end_seen)));
+            let own_std_m = hands::grip_std_m(trajectory.closed_end_seen());
             let mut contexts: Vec<(Face, Option<Rect>, Point, f64)> = Vec::new();
             for rect in known {
                 contexts.extend(face.map(|f| (f, rect, grip, best_std_m)));
@@ -549,82 +471,5 @@ fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around, round
         observed_range: widest,
         moved,
         refuted: None,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::articulation::{Action, Outcome};
-    use crate::math::Vector;
-    use crate::pipeline::told::tests::clips;
-
-    /// A clip with a front of such support, so far before the others', from which its grip stands `off`, and so far to the right.
-    fn clip(front: f64, [off, right]: [f64; 2], support: f64, seen: bool) -> ClipResult {
-        let mut clip = clips(&[("open the oven", true)]).remove(0);
-        let face = Face {
-            center: Point::origin(),
-            right: Vector::x(),
-            up: Vector::z(),
-            normal: -Vector::y(),
-            extent: [[-1.0, 1.0]; 2],
-            support,
-        };
-        let grip = face.point(right, 0.0, front + Config::default().geometry.grip_standoff_m + off);
-        clip.face = Some(Face { center: face.point(right, 0.0, front), ..face });
-        if let Some(hand) = &mut clip.trajectory {
-            hand.ends_seen = [seen; 2];
-            hand.samples[0].smoothed = grip;
-        }
-        clip.joint = Outcome::Found(inference::ClipJoint {
-            joint: Articulation { kind: JointKind::Prismatic, axis: face.normal, origin: grip },
-            contact_pivot: grip,
-            source: AxisSource::Line,
-            type_probability: 1.0,
-            joint_probability: 1.0,
-            residual_m: 0.0,
-            inliers: 1.0,
-            radius_m: None,
-            observed_range: 0.2,
-            grip,
-            action: Action::Open,
-        });
-        clip
-    }
-
-    fn trusts(clips: &[ClipResult]) -> Vec<f64> {
-        let grips: Vec<Grip> = (0..clips.len()).filter_map(|c| Grip::of(clips, c)).collect();
-        (0..clips.len()).map(|c| trust(clips, c, &grips, &Config::default())).collect()
-    }
-
-    #[test]
-    fn the_front_of_a_part_is_that_of_the_clip_that_saw_it_closed_best() {
-        let alone = |off: f64, support: f64, seen: bool| trusts(&[clip(0.0, [off, 0.0], support, seen)])[0];
-        // Half the support counts a quarter; a hand that was seen, four times one that was lost at the same place, but for the
-        // fifth of all that only seemed to be seen.
-        assert!((alone(0.0, 0.4, true) / alone(0.0, 0.2, true) - 4.0).abs() < 1e-9);
-        assert!((3.0..10.0).contains(&(alone(0.0, 0.4, true) / alone(0.0, 0.4, false))));
-        // Lost before a large front, or at a small thing: also where the hand only seemed to be seen.
-        assert!(alone(0.15, 0.4, false) > 2.0 * alone(0.0, 0.08, false));
-        assert!(alone(0.15, 0.4, true) > alone(0.0, 0.08, true));
-        // Of fronts as large the one that the hand is at; behind its front no hand is lost.
-        assert!(alone(0.0, 0.4, true) > 4.0 * alone(0.15, 0.4, true));
-        assert!(alone(0.0, 0.08, false) > 2.0 * alone(-0.15, 0.4, false));
-        // Two clips of a part: a hand that is lost before the other's front says little against it, one behind it much, and the
-        // more where it was seen.
-        let two = |seen: bool| trusts(&[clip(0.0, [0.0; 2], 0.2, seen), clip(0.3, [0.0; 2], 0.4, false)]);
-        let [lost, seen] = [two(false), two(true)].map(|t| t[0] / t[1]);
-        assert!(lost > 2.0 && seen > 2.0 * lost, "{lost} {seen}");
-    }
-
-    #[test]
-    fn a_clip_that_is_trusted_most_but_has_no_answer_gives_no_front() {
-        let mut clips = [clip(0.0, [0.0; 2], 0.4, true), clip(0.0, [0.0; 2], 0.2, true)];
-        let best = |clips: &[ClipResult]| best_seen(clips, &[0, 1], &Config::default());
-        assert_eq!(best(&clips), Some(0));
-        clips[0].joint = Outcome::Abstained("no direction for a slide".to_owned());
-        assert_eq!(best(&clips), Some(1));
-        clips[1].joint = clips[0].joint.clone();
-        assert_eq!(best(&clips), None);
     }
 }
