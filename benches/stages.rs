@@ -98,7 +98,6 @@ fn view_select(c: &mut Criterion) {
             voxel_m: 0.05,
             voxels: centers.iter().map(|p| voxels::index(p, 0.05)).collect(),
             min_views: 4,
-            points: Vec::new(),
             class: None,
             local_frames: Vec::new(),
             viewpoint: Point::origin(),
@@ -121,9 +120,10 @@ fn view_select(c: &mut Criterion) {
             reconstruction: Vec::new(),
             depth_factors: DepthFactors::default(),
         };
+        let idle: Vec<usize> = (0..recording.frames.len()).collect();
         let config = config::Localization { min_visible_share: 0.5, ..Default::default() };
         stage(c, stage_name, || {
-            black_box(views::reselect(black_box(&recording), &region, None, &config));
+            black_box(views::reselect(black_box(&recording), &idle, &region, None, &config));
         });
     }
 }

@@ -383,6 +383,7 @@ mod tests {
             noun: String::new(),
         };
         let clip = ClipResult {
+            closed_frames: Vec::new(),
             clip,
             trajectory: Some(hand(&DOOR, &GRIP, 1.1)),
             region: None,

@@ -12,7 +12,7 @@ use crate::localization::{Region, views};
 use crate::math::line::{Line, Segment};
 use crate::math::{Point, Vector, stats, unit, unsigned_angle};
 use crate::pipeline::Scene;
-use crate::recording::Recording;
+use crate::recording::{AtWork, Recording};
 use crate::twin::OrientedBox;
 
 /// A line this near to an edge of furniture, and this parallel to it, is that edge.
@@ -243,7 +243,7 @@ pub fn measure_segments(
     const LEAST_PX: f64 = 20.0;
     let camera = &recording.camera;
     let edges = truth.edges();
-    for frame in views::survey(recording, FRAMES) {
+    for frame in views::survey(recording, &AtWork::of(recording), FRAMES) {
         let segments: Vec<Segment2> = match (recording.segments(frame)?, recording.grey(frame)?) {
             (Some(ends), _) => ends.into_iter().map(|[a, b]| Segment2 { a, b }).collect(),
             (None, Some(grey)) => detector.detect(&grey, LEAST_PX),
@@ -384,7 +384,6 @@ mod tests {
             voxel_m: 0.05,
             voxels,
             min_views: 4,
-            points: Vec::new(),
             class: None,
             local_frames: Vec::new(),
             viewpoint: Point::origin(),

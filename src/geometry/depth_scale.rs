@@ -11,7 +11,6 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::math::{Point, Vector, stats};
@@ -58,13 +57,21 @@ struct View<'a> {
     samples: Vec<Sample>,
 }
 
-/// One comparison of two frames at one place.
+/// One comparison of two frames at one place: `n . x_a`, `n . x_b`, `n . (c_a - c_b)`.
+type Link = [f64; 3];
+
+/// How far the two surfaces of a comparison are apart under the frames' factors, metres.
+fn residual([xa, xb, base]: Link, [a, b]: [f64; 2]) -> f64 {
+    base + a * xa - b * xb
+}
+
+/// What one frame's comparisons with another say: their share of the normal equations. Unknowns are `d_a`, `d_b` and `t`.
 #[derive(Debug, Clone, Copy)]
-struct Link {
-    a: usize,
+struct Pair {
     b: usize,
-    /// `n . x_a`, `n . x_b`, `n . (c_a - c_b)`.
-    coefficients: [f64; 3],
+    /// Upper triangle by rows: `aa`, `ab`, `at`, `bb`, `bt`, `tt`.
+    matrix: [f64; 6],
+    rhs: [f64; 3],
 }
 
 /// Solves the factors that each frame's depth has to be multiplied by: 1 where nothing tells, the common one for frames
@@ -83,14 +90,19 @@ pub fn solve(recording: &Recording, sketches: &BTreeMap<usize, Sketch>) -> Depth
     let mut factors: Vec<f64> = views.iter().map(|v| recording.depth_factor(v.sketch.frame)).collect();
     'gates: for (gate_m, stride) in GATES_M.into_iter().zip(STRIDES) {
         for _ in 0..ROUNDS {
-            let links: Vec<Vec<Link>> = partners
+            let pairs: Vec<Vec<Pair>> = partners
                 .par_iter()
                 .enumerate()
                 .map(|(a, others)| {
-                    others.iter().flat_map(|&b| compare(recording, &views, [a, b], &factors, gate_m, stride)).collect()
+                    let pair = |&b: &usize| {
+                        let links = compare(recording, &views, [a, b], &factors, gate_m, stride);
+                        (links.len() >= LEAST_LINKS.div_ceil(stride))
+                            .then(|| weighed(&links, b, [factors[a], factors[b]], gate_m))
+                    };
+                    others.iter().filter_map(pair).collect()
                 })
                 .collect();
-            let Some(next) = adjust(&links, &factors, gate_m, LEAST_LINKS.div_ceil(stride)) else { break 'gates };
+            let Some(next) = adjust(&pairs) else { break 'gates };
             let moved: f64 = next.iter().zip(&factors).map(|(a, b)| (a - b).powi(2)).sum();
             factors = next;
             if moved < views.len() as f64 * SETTLED * SETTLED {
@@ -104,13 +116,13 @@ pub fn solve(recording: &Recording, sketches: &BTreeMap<usize, Sketch>) -> Depth
 
 fn view<'a>(recording: &Recording, sketch: &'a Sketch) -> View<'a> {
     // Wide enough to average pixel noise, narrow enough for a drawer's front.
-    let reach = (sketch.depth.width / 40).max(2);
+    let reach = (sketch.depth_mm.width / 40).max(2);
     let pose = &recording.frames[sketch.frame].world_from_camera;
-    let area = sketch.depth.data.len();
+    let area = sketch.depth_mm.data.len();
     let stride = ((area as f64 / SAMPLES as f64).sqrt().round() as usize).max(1);
     let mut samples = Vec::new();
-    for y in (stride / 2..sketch.depth.height).step_by(stride) {
-        for x in (stride / 2..sketch.depth.width).step_by(stride) {
+    for y in (stride / 2..sketch.depth_mm.height).step_by(stride) {
+        for x in (stride / 2..sketch.depth_mm.width).step_by(stride) {
             let Some(p) = sketch.point(&recording.camera, x, y) else { continue };
             let Some(n) = sketch.normal(&recording.camera, x, y, reach) else { continue };
             // Surfaces seen at a grazing angle have no usable normal.
@@ -181,7 +193,7 @@ fn compare(
             let local = Point::from(center + turned * s.offset);
             let (u, v) = camera.project(&local).filter(|_| local.z > 0.2)?;
             let (x, y) = to.sketch.sample(u, v)?;
-            let z = f64::from(to.sketch.depth.data[y * to.sketch.depth.width + x]);
+            let z = f64::from(to.sketch.depth_m(y * to.sketch.depth_mm.width + x));
             if z <= 0.0 {
                 return None;
             }
@@ -189,9 +201,8 @@ fn compare(
             // which is what the gate then checks.
             let (us, vs) = to.sketch.pixel(x, y);
             let other = world_from_camera * camera.unproject(us, vs, z).coords;
-            let coefficients = [s.along, s.normal.dot(&other), s.normal.dot(&baseline)];
-            let link = Link { a, b, coefficients };
-            if link.residual(factors).abs() > gate_m {
+            let link = [s.along, s.normal.dot(&other), s.normal.dot(&baseline)];
+            if residual(link, [factors[a], factors[b]]).abs() > gate_m {
                 return None;
             }
             // A side of a board can lie in the plane's slab far from the place that was looked for.
@@ -201,54 +212,103 @@ fn compare(
         .collect()
 }
 
-impl Link {
-    fn residual(&self, factors: &[f64]) -> f64 {
-        let [xa, xb, base] = self.coefficients;
-        base + factors[self.a] * xa - factors[self.b] * xb
+/// The links of a pair, robustly weighted.
+fn weighed(links: &[Link], b: usize, factors: [f64; 2], gate_m: f64) -> Pair {
+    let weight = (INDEPENDENT / links.len() as f64).min(1.0) / SAMPLE_STD_M.powi(2);
+    let scale = (0.4 * gate_m).max(SAMPLE_STD_M);
+    let mut pair = Pair { b, matrix: [0.0; 6], rhs: [0.0; 3] };
+    for &link in links {
+        let w = weight / (1.0 + (residual(link, factors) / scale).powi(2)).powi(2);
+        let [xa, xb, base] = link;
+        let row = [xa, -xb, base];
+        let products = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|(i, k)| w * row[i] * row[k]);
+        pair.matrix.iter_mut().zip(products).for_each(|(sum, x)| *sum += x);
+        pair.rhs.iter_mut().zip(row).for_each(|(sum, x)| *sum -= w * x * (xa - xb));
+    }
+    pair
+}
+
+/// One least-squares step for all factors; `None` where the system cannot be solved.
+///
+/// Each frame meets a few others and the common factor: all but one row of the system are sparse. The common factor is
+/// eliminated, and what is left is solved by conjugate gradients, in time that grows with the number of frames.
+fn adjust(pairs: &[Vec<Pair>]) -> Option<Vec<f64>> {
+    let n = pairs.len();
+    let mut frames = Sparse { diagonal: vec![FRAME_STD.powi(-2); n], rows: vec![Vec::new(); n] };
+    let (mut rhs, mut border) = (vec![0.0; n], vec![0.0; n]);
+    let (mut corner, mut corner_rhs) = (COMMON_STD.powi(-2), COMMON_STD.powi(-2));
+    for (a, pair) in pairs.iter().enumerate().flat_map(|(a, of)| of.iter().map(move |p| (a, p))) {
+        let [aa, ab, at, bb, bt, tt] = pair.matrix;
+        frames.diagonal[a] += aa;
+        frames.diagonal[pair.b] += bb;
+        frames.rows[a].push((pair.b, ab));
+        frames.rows[pair.b].push((a, ab));
+        border[a] += at;
+        border[pair.b] += bt;
+        corner += tt;
+        rhs[a] += pair.rhs[0];
+        rhs[pair.b] += pair.rhs[1];
+        corner_rhs += pair.rhs[2];
+    }
+    let (own, common) = (frames.solve(&rhs)?, frames.solve(&border)?);
+    let t = (corner_rhs - dot(&border, &own)) / (corner - dot(&border, &common));
+    let next: Vec<f64> = own.iter().zip(&common).map(|(own, common)| (1.0 + own - t * common) / t).collect();
+    // Half or twice the depth is a broken export, which is told elsewhere.
+    next.iter().all(|s| (0.5..2.0).contains(s)).then_some(next)
+}
+
+/// A symmetric positive definite matrix of which most is zero.
+struct Sparse {
+    diagonal: Vec<f64>,
+    /// Beside the diagonal, by rows: column and value; a column may stand in a row more than once.
+    rows: Vec<Vec<(usize, f64)>>,
+}
+
+impl Sparse {
+    fn times(&self, x: &[f64]) -> Vec<f64> {
+        let row = |(i, row): (usize, &Vec<(usize, f64)>)| {
+            row.iter().fold(self.diagonal[i] * x[i], |sum, (k, value)| sum + value * x[*k])
+        };
+        // Each row is summed in its own order: the same on any number of threads.
+        self.rows.par_iter().with_min_len(256).enumerate().map(row).collect()
+    }
+
+    /// Conjugate gradients with the diagonal as preconditioner (Hestenes and Stiefel 1952); `None` where they do not settle.
+    fn solve(&self, rhs: &[f64]) -> Option<Vec<f64>> {
+        /// Of the right-hand side: far below what any factor is known to.
+        const EXACT: f64 = 1e-12;
+        /// The prior on the diagonal bounds the condition: some hundred steps are usual.
+        const STEPS: usize = 10_000;
+        let scaled = |r: &[f64]| -> Vec<f64> { r.iter().zip(&self.diagonal).map(|(r, d)| r / d).collect() };
+        let mut x = vec![0.0; rhs.len()];
+        let mut left = rhs.to_vec();
+        let mut z = scaled(&left);
+        let mut way = z.clone();
+        let mut energy = dot(&left, &z);
+        let enough = EXACT * EXACT * energy;
+        for _ in 0..STEPS {
+            if energy <= enough {
+                return Some(x);
+            }
+            let along = self.times(&way);
+            let step = energy / dot(&way, &along);
+            if !step.is_finite() {
+                return None;
+            }
+            x.iter_mut().zip(&way).for_each(|(x, w)| *x += step * w);
+            left.iter_mut().zip(&along).for_each(|(r, a)| *r -= step * a);
+            z = scaled(&left);
+            let next = dot(&left, &z);
+            let turn = next / energy;
+            way.iter_mut().zip(&z).for_each(|(w, z)| *w = z + turn * *w);
+            energy = next;
+        }
+        None
     }
 }
 
-/// One robust least-squares step for all factors; `None` where the system cannot be solved.
-fn adjust(links: &[Vec<Link>], factors: &[f64], gate_m: f64, least_links: usize) -> Option<Vec<f64>> {
-    let n = factors.len();
-    // Unknowns: each frame's d, then t of the common factor.
-    let mut matrix = DMatrix::<f64>::zeros(n + 1, n + 1);
-    let mut rhs = DVector::<f64>::zeros(n + 1);
-    for of_frame in links {
-        let mut start = 0;
-        while start < of_frame.len() {
-            let pair = of_frame[start].b;
-            let end = start + of_frame[start..].iter().take_while(|l| l.b == pair).count();
-            let members = &of_frame[start..end];
-            start = end;
-            if members.len() < least_links {
-                continue;
-            }
-            let weight = (INDEPENDENT / members.len() as f64).min(1.0) / SAMPLE_STD_M.powi(2);
-            for link in members {
-                let residual = link.residual(factors);
-                let scale = (0.4 * gate_m).max(SAMPLE_STD_M);
-                let w = weight / (1.0 + (residual / scale).powi(2)).powi(2);
-                let [xa, xb, base] = link.coefficients;
-                let row = [(link.a, xa), (link.b, -xb), (n, base)];
-                for (i, x) in row {
-                    for (j, y) in row {
-                        matrix[(i, j)] += w * x * y;
-                    }
-                    rhs[i] -= w * x * (xa - xb);
-                }
-            }
-        }
-    }
-    for i in 0..n {
-        matrix[(i, i)] += FRAME_STD.powi(-2);
-    }
-    matrix[(n, n)] += COMMON_STD.powi(-2);
-    rhs[n] += COMMON_STD.powi(-2);
-    let solved = matrix.cholesky()?.solve(&rhs);
-    let next: Vec<f64> = solved.iter().take(n).map(|d| (1.0 + d) / solved[n]).collect();
-    // Half or twice the depth is a broken export, which is told elsewhere.
-    next.iter().all(|s| (0.5..2.0).contains(s)).then_some(next)
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]
@@ -312,6 +372,30 @@ mod tests {
                 assert!((found.of(i) / factor - 1.0).abs() < 5e-3, "{common}: frame {i}: {} of {factor}", found.of(i));
             }
         }
+    }
+
+    #[test]
+    fn conjugate_gradients_solve_what_a_dense_factorisation_solves() {
+        let n = 40;
+        let mut sparse = Sparse { diagonal: vec![3.0; n], rows: vec![Vec::new(); n] };
+        let mut dense = nalgebra::DMatrix::<f64>::identity(n, n) * 3.0;
+        for i in 0..n {
+            // The same pair may be met twice.
+            for k in [(7 * i + 1) % n, (i + 1) % n] {
+                let value = 0.3 * ((i * k) as f64).sin();
+                if i != k {
+                    sparse.rows[i].push((k, value));
+                    sparse.rows[k].push((i, value));
+                    dense[(i, k)] += value;
+                    dense[(k, i)] += value;
+                }
+            }
+        }
+        let rhs: Vec<f64> = (0..n).map(|i| (i as f64).cos()).collect();
+        let found = sparse.solve(&rhs).unwrap();
+        let exact = dense.cholesky().unwrap().solve(&nalgebra::DVector::from_vec(rhs));
+        assert!(found.iter().zip(&exact).all(|(a, b)| (a - b).abs() < 1e-10));
+        assert_eq!(sparse.solve(&vec![0.0; n]), Some(vec![0.0; n]));
     }
 
     #[test]

@@ -81,12 +81,12 @@ impl View<'_> {
     /// Calls `take` with the direction in the camera's axes, per metre of depth, and the depth (metres) of every sample that has
     /// one.
     pub(super) fn each_depth(&self, mut take: impl FnMut(Vector, f64)) {
-        let grid = &self.sketch.depth;
+        let grid = &self.sketch.depth_mm;
         let columns: Vec<f64> = (0..grid.width).map(|x| self.camera.unproject(x as f64, 0.0, 1.0).x).collect();
         for (y, row) in grid.data.chunks_exact(grid.width.max(1)).enumerate() {
             let y = self.camera.unproject(0.0, y as f64, 1.0).y;
-            for (&x, &z) in columns.iter().zip(row).filter(|(_, z)| **z > 0.0) {
-                take(Vector::new(x, y, 1.0), f64::from(z) * self.factor);
+            for (&x, &mm) in columns.iter().zip(row).filter(|(_, mm)| **mm > 0) {
+                take(Vector::new(x, y, 1.0), f64::from(f32::from(mm) * 1e-3) * self.factor);
             }
         }
     }
@@ -101,7 +101,7 @@ impl View<'_> {
     pub(super) fn gap_at(&self, local: &Point) -> Option<(f64, f64)> {
         let (x, y) = self.camera.project(local).filter(|_| local.z > NEAREST_M)?;
         let (x, y) = self.sketch.nearest(x, y)?;
-        let z = f64::from(self.sketch.depth.data[y * self.sketch.depth.width + x]) * self.factor;
+        let z = f64::from(self.sketch.depth_m(y * self.sketch.depth_mm.width + x)) * self.factor;
         (z > 0.0).then_some((z - local.z, local.z))
     }
 }
@@ -137,7 +137,7 @@ pub fn open_frames(recording: &Recording, clip: &Clip, trajectory: &Trajectory) 
         recording
             .clips
             .iter()
-            .any(|c| c.clip != clip.clip && c.end_frame > c.start_frame && (c.start_frame..=c.end_frame).contains(&f))
+            .any(|c| (c.start_frame..=c.end_frame).contains(&f) && c.end_frame > c.start_frame && c.clip != clip.clip)
     };
     let grip = trajectory.open_grip();
     let mut after = |from: usize, hold: Hold| {
@@ -159,7 +159,7 @@ pub fn open_frames(recording: &Recording, clip: &Clip, trajectory: &Trajectory) 
     let moves_on = stands.abs_diff(end) > 4 * FREE;
     let [from, to] = [end.min(stands), end.max(stands)];
     let meanwhile =
-        |c: &Clip| c.clip != clip.clip && c.end_frame > c.start_frame && c.start_frame < to && c.end_frame > from;
+        |c: &Clip| c.start_frame < to && c.end_frame > from && c.end_frame > c.start_frame && c.clip != clip.clip;
     match trajectory.open_end_seen() {
         true => after(end, Hold::Free),
         false if moves_on => after(end, Hold::Lost),

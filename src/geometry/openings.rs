@@ -4,7 +4,7 @@
 //! well as the leaf is seen: leaf and front meet at the hinge, so a leaf that is seen at two angles gives the hinge and both
 //! angles. Starting from a joint and the hand's openings, this is a least-squares fit of the leaf to the views' depth.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Matrix2, Vector2};
 
 use super::Face;
 use super::candidates::within_front;
@@ -141,31 +141,27 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
         let moved = shifted(joint, &e1, &e2, shift);
         let flat_offsets: Vec<f64> = offsets.iter().flatten().copied().collect();
         let step =
-            normal_equations(&leaf, joint, &moved, [&e1, &e2], shift, &flat, &flat_offsets, &shared, scale, noise)?;
-        let solved = step.matrix.clone().cholesky()?;
-        let change = solved.solve(&step.vector);
-        if !change.iter().all(|x| x.is_finite()) {
-            return None;
-        }
+            normal_equations(&leaf, joint, &moved, [&e1, &e2], shift, &flat, &flat_offsets, &shared, scale, noise);
+        let solved = step.solved()?;
         for k in 0..2 {
-            shift[k] += change[k];
+            shift[k] += solved.hinge[k];
         }
-        for (offset, change) in offsets.iter_mut().flatten().zip(change.iter().skip(2).step_by(2)) {
-            *offset += change;
+        for (offset, change) in offsets.iter_mut().flatten().zip(&solved.views) {
+            *offset += change[0];
         }
-        for (bias, change) in shared.iter_mut().zip(change.iter().skip(3).step_by(2)) {
-            *bias += change;
+        for (bias, change) in shared.iter_mut().zip(&solved.views) {
+            *bias += change[1];
         }
         scale = (scale * 0.75).max(TIGHT_M);
-        fit = Some((solved.inverse(), step.points));
+        fit = Some((solved, step.points));
     }
-    let (covariance, points) = fit?;
+    let (Solved { hinge_cov, opening_vars, .. }, points) = fit?;
     if points < LEAST_POINTS {
         return None;
     }
-    let rows: [[f64; 2]; 2] = std::array::from_fn(|row| std::array::from_fn(|column| covariance[(row, column)]));
+    let rows: [[f64; 2]; 2] = std::array::from_fn(|row| std::array::from_fn(|column| hinge_cov[(row, column)]));
     let hinge_cov_m2 = (joint.kind == JointKind::Revolute).then_some(rows);
-    let mut index = 2;
+    let mut variances = opening_vars.into_iter();
     let openings = seen
         .iter()
         .zip(&offsets)
@@ -174,8 +170,7 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
                 .iter()
                 .zip(offsets)
                 .map(|(s, offset)| {
-                    let std = covariance[(index, index)].max(0.0).sqrt();
-                    index += 2;
+                    let std = variances.next().unwrap_or(0.0).max(0.0).sqrt();
                     // Depth at least halves the variance (0.7^2), or it told nothing. What is left then is the robust prior,
                     // which is narrower at its top than the hand is sure.
                     let informed = std < 0.7 * s.std;
@@ -295,10 +290,63 @@ fn reach(hold: Hold) -> f64 {
     }
 }
 
+/// Normal equations in which every view meets the hinge, and no other view.
 struct Equations {
-    matrix: DMatrix<f64>,
-    vector: DVector<f64>,
+    hinge: Matrix2<f64>,
+    hinge_rhs: Vector2<f64>,
+    views: Vec<OfView>,
     points: usize,
+}
+
+/// What concerns one view: the offset of its opening and the error that its depth shares.
+#[derive(Clone, Copy)]
+struct OfView {
+    own: Matrix2<f64>,
+    /// Rows: the hinge's two shifts.
+    with_hinge: Matrix2<f64>,
+    rhs: Vector2<f64>,
+}
+
+/// The step of one iteration, with the covariances about it.
+struct Solved {
+    hinge: Vector2<f64>,
+    views: Vec<Vector2<f64>>,
+    hinge_cov: Matrix2<f64>,
+    /// Variance of each view's opening.
+    opening_vars: Vec<f64>,
+}
+
+impl Equations {
+    /// The views are eliminated one by one: time grows with their number. `None` where there is no solution.
+    fn solved(&self) -> Option<Solved> {
+        let inverses: Vec<Matrix2<f64>> =
+            self.views.iter().map(|v| v.own.try_inverse()).collect::<Option<_>>()?;
+        let (mut hinge, mut rhs) = (self.hinge, self.hinge_rhs);
+        for (view, inverse) in self.views.iter().zip(&inverses) {
+            let by = view.with_hinge * inverse;
+            hinge -= by * view.with_hinge.transpose();
+            rhs -= by * view.rhs;
+        }
+        let hinge_cov = hinge.cholesky()?.inverse();
+        let shift = hinge_cov * rhs;
+        let views: Vec<Vector2<f64>> = self
+            .views
+            .iter()
+            .zip(&inverses)
+            .map(|(view, inverse)| inverse * (view.rhs - view.with_hinge.transpose() * shift))
+            .collect();
+        let opening_vars = self
+            .views
+            .iter()
+            .zip(&inverses)
+            .map(|(view, inverse)| {
+                let by = inverse * view.with_hinge.transpose();
+                (inverse + by * hinge_cov * by.transpose())[(0, 0)]
+            })
+            .collect();
+        let finite = shift.iter().chain(views.iter().flatten()).all(|x| x.is_finite());
+        finite.then_some(Solved { hinge: shift, views, hinge_cov, opening_vars })
+    }
 }
 
 /// Gauss-Newton about the present state: two shifts of the hinge, then for each view an offset of its opening and the error
@@ -315,27 +363,26 @@ fn normal_equations(
     shared: &[f64],
     scale: f64,
     noise: &Noise,
-) -> Option<Equations> {
-    let size = 2 + 2 * seen.len();
-    let mut matrix = DMatrix::zeros(size, size);
-    let mut vector = DVector::zeros(size);
+) -> Equations {
     let information = match start.kind {
         JointKind::Revolute => [PLANE_STD_M.powi(-2), noise.hinge_m.powi(-2)],
         // A slide has no place: the shift is held at zero.
         JointKind::Prismatic => [1e12; 2],
     };
-    for k in 0..2 {
-        matrix[(k, k)] += information[k];
-        vector[k] -= information[k] * shift[k];
-    }
-    let mut points = 0;
-    for (i, ((s, offset), bias)) in seen.iter().zip(offsets).zip(shared).enumerate() {
-        let slot = 2 + 2 * i;
+    let mut out = Equations {
+        hinge: Matrix2::from_diagonal(&Vector2::from(information)),
+        hinge_rhs: Vector2::new(-information[0] * shift[0], -information[1] * shift[1]),
+        views: Vec::with_capacity(seen.len()),
+        points: 0,
+    };
+    for ((s, offset), bias) in seen.iter().zip(offsets).zip(shared) {
         let told = (TAIL + 1.0) / (TAIL + (offset / s.std).powi(2)) / (s.std * s.std);
-        matrix[(slot, slot)] += told;
-        vector[slot] -= told * offset;
-        matrix[(slot + 1, slot + 1)] += SHARED_STD_M.powi(-2);
-        vector[slot + 1] -= bias / (SHARED_STD_M * SHARED_STD_M);
+        let bias_info = SHARED_STD_M.powi(-2);
+        let mut of_view = OfView {
+            own: Matrix2::from_diagonal(&Vector2::new(told, bias_info)),
+            with_hinge: Matrix2::zeros(),
+            rhs: Vector2::new(-told * offset, -bias_info * bias),
+        };
         let opening = s.hand + offset;
         let motion = joint.motion(opening);
         let turn = motion.rotation;
@@ -362,23 +409,22 @@ fn normal_equations(
             .collect();
         let total: f64 = rows.iter().map(|(_, _, w)| w).sum();
         // Of a leaf of which less than a tenth is in its place nothing is known.
-        if total < 0.1 * rows.len() as f64 || total < 4.0 {
-            continue;
-        }
-        points += total as usize;
-        let worth = (INDEPENDENT / total).min(1.0) / (OWN_STD_M * OWN_STD_M);
-        let slots = [0, 1, slot, slot + 1];
-        for (j, r, w) in rows {
-            let w = w * worth;
-            for a in 0..4 {
-                vector[slots[a]] += w * j[a] * r;
-                for b in 0..4 {
-                    matrix[(slots[a], slots[b])] += w * j[a] * j[b];
-                }
+        if total >= 0.1 * rows.len() as f64 && total >= 4.0 {
+            out.points += total as usize;
+            let worth = (INDEPENDENT / total).min(1.0) / (OWN_STD_M * OWN_STD_M);
+            for ([a, b, c, d], r, w) in rows {
+                let w = w * worth;
+                let (hinge, own) = (Vector2::new(a, b), Vector2::new(c, d));
+                out.hinge += hinge * hinge.transpose() * w;
+                out.hinge_rhs += hinge * (w * r);
+                of_view.own += own * own.transpose() * w;
+                of_view.with_hinge += hinge * own.transpose() * w;
+                of_view.rhs += own * (w * r);
             }
         }
+        out.views.push(of_view);
     }
-    matrix.iter().all(|x: &f64| x.is_finite()).then_some(Equations { matrix, vector, points })
+    out
 }
 
 #[cfg(test)]

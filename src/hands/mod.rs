@@ -129,7 +129,7 @@ pub fn trajectory(
     config: &config::Hands,
 ) -> Outcome<Trajectory> {
     let samples_of = |side: Side, from: usize, to: usize| -> Vec<&HandSample> {
-        recording.hands.iter().filter(|s| s.side == side && (from..=to).contains(&s.frame)).collect()
+        recording.hands_in(from, to).iter().filter(|s| s.side == side).collect()
     };
     let [from, to] = widened(recording, clip, config.widen_secs);
     let mut in_clip = 0;

@@ -3,7 +3,7 @@
 pub mod views;
 pub mod voxels;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +12,7 @@ use crate::config;
 use crate::hands::{Trajectory, grip_std_m};
 use crate::math::Point;
 use crate::recording::sketch::Sketch;
-use crate::recording::{Clip, HAND_CLASS, Recording};
+use crate::recording::{AtWork, Clip, HAND_CLASS, Recording};
 
 /// The touched piece of furniture, coarsely: `V_conf`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -23,9 +23,6 @@ pub struct Region {
     pub voxels: Vec<[i32; 3]>,
     /// Distinct views that a voxel needed in the end (the configured number, or fewer where nothing reached it).
     pub min_views: usize,
-    /// Points inside the confident voxels, world, metres; at most [`MAX_POINTS`].
-    #[serde(skip)]
-    pub points: Vec<Point>,
     /// Mask class of the touched furniture, where masks tell.
     pub class: Option<u8>,
     /// The local frames.
@@ -44,41 +41,45 @@ impl Region {
     }
 }
 
-/// Surface points kept of a region: about ten on every square centimetre of a door.
+/// Surface points of a region at the most: about ten on every square centimetre of a door.
 const MAX_POINTS: usize = 60_000;
 
-/// Finds the confident region of one clip. `sketches` holds the frames of [`local_frames`].
+/// A recording with what was looked at of it.
+#[derive(Debug, Clone, Copy)]
+pub struct Footage<'a> {
+    /// The recording.
+    pub recording: &'a Recording,
+    /// The frames that were looked at, those of [`local_frames`] among them.
+    pub sketches: &'a BTreeMap<usize, Sketch>,
+    /// When somebody is at work.
+    pub at_work: &'a AtWork,
+}
+
+/// Finds the confident region of one clip, of which `frames` are the [`local_frames`].
 #[must_use]
 pub fn localize(
-    recording: &Recording,
+    footage: &Footage,
     clip: &Clip,
     trajectory: &Trajectory,
-    sketches: &BTreeMap<usize, Sketch>,
+    frames: &[usize],
     config: &config::Localization,
 ) -> Outcome<Region> {
     const NEAR_M: f64 = 0.2;
+    let Footage { recording, sketches, .. } = *footage;
     let grip = trajectory.closed_grip();
-    let frames = local_frames(recording, clip, trajectory, config);
     let Some(&nearest) = frames.first() else {
         return Outcome::Abstained("no frame with depth sees the grip while the furniture is closed".to_owned());
     };
     let images: Vec<&Sketch> = frames.iter().filter_map(|f| sketches.get(f)).collect();
     let class = touched_class(recording, &images, &grip);
-    let mut seen: Vec<(u32, Point)> = Vec::new();
-    for (view, sketch) in images.iter().enumerate() {
-        let near = |p: &Point| (p - grip).norm() <= config.reach_m;
-        seen.extend(points(recording, sketch, class).into_iter().filter(near).map(|p| (view as u32, p)));
-    }
+    let mut seen = within_reach(recording, &images, 0, class, &grip, config);
     if seen.is_empty() {
         return Outcome::Abstained("no depth within reach of the hand in the local frames".to_owned());
     }
     // A person at a door sees half of it: frames of the whole recording in which nobody is at work show the rest.
     if config.closed_state_frames {
-        for (view, sketch) in others(recording, clip, &frames, sketches, &grip).into_iter().enumerate() {
-            let near = |p: &Point| (p - grip).norm() <= config.reach_m;
-            let view = (images.len() + view) as u32;
-            seen.extend(points(recording, sketch, class).into_iter().filter(near).map(|p| (view, p)));
-        }
+        let others = others(footage, clip, frames, &grip);
+        seen.extend(within_reach(recording, &others, images.len(), class, &grip, config));
     }
     let counts = voxels::count_views(&seen, config.voxel_m);
     // A grip stands off its face by a handle, and hands are estimated to a few centimetres. One that was first seen on the way
@@ -92,20 +93,12 @@ pub fn localize(
         let connected = voxels::connected_with(&confident, &grip, config.voxel_m, near_m);
         // A face of 30 x 30 cm fills 36 voxels of 5 cm; a third of that is no furniture.
         if connected.len() >= 12 {
-            let inside: std::collections::HashSet<[i32; 3]> = connected.iter().copied().collect();
-            let points: Vec<Point> = seen
-                .iter()
-                .filter(|(_, p)| inside.contains(&voxels::index(p, config.voxel_m)))
-                .map(|(_, p)| *p)
-                .collect();
-            let points = points.iter().copied().step_by(points.len().div_ceil(MAX_POINTS)).collect();
             return Outcome::Found(Region {
                 voxel_m: config.voxel_m,
                 voxels: connected,
                 min_views,
-                points,
                 class,
-                local_frames: frames,
+                local_frames: frames.to_vec(),
                 viewpoint: recording.frames[nearest].center(),
                 grip,
             });
@@ -114,20 +107,49 @@ pub fn localize(
     Outcome::Abstained("no confident voxels near the hand".to_owned())
 }
 
+/// Points within reach of a grip, with the number of the view that shows each, from `first` on.
+fn within_reach(
+    recording: &Recording,
+    views: &[&Sketch],
+    first: usize,
+    class: Option<u8>,
+    grip: &Point,
+    config: &config::Localization,
+) -> Vec<(u32, Point)> {
+    let near = |p: &Point| (p - grip).norm() <= config.reach_m;
+    let of_view = |(view, sketch): (usize, &&Sketch)| {
+        let view = (first + view) as u32;
+        points(recording, sketch, class).into_iter().filter(near).map(move |p| (view, p)).collect::<Vec<_>>()
+    };
+    views.iter().enumerate().flat_map(of_view).collect()
+}
+
+/// Points inside a region's voxels, of the views that it was found in: world, metres; at most [`MAX_POINTS`].
+#[must_use]
+pub fn inside(footage: &Footage, clip: &Clip, region: &Region, config: &config::Localization) -> Vec<Point> {
+    let Footage { recording, sketches, .. } = *footage;
+    let mut views: Vec<&Sketch> = region.local_frames.iter().filter_map(|f| sketches.get(f)).collect();
+    if config.closed_state_frames {
+        views.extend(others(footage, clip, &region.local_frames, &region.grip));
+    }
+    let voxels: HashSet<[i32; 3]> = region.voxels.iter().copied().collect();
+    let points: Vec<Point> = within_reach(recording, &views, 0, region.class, &region.grip, config)
+        .into_iter()
+        .map(|(_, p)| p)
+        .filter(|p| voxels.contains(&voxels::index(p, region.voxel_m)))
+        .collect();
+    points.iter().copied().step_by(points.len().div_ceil(MAX_POINTS).max(1)).collect()
+}
+
 /// Frames of the whole recording that see the grip while nobody is at work, other than the local ones: at most forty, spread
 /// over the recording.
-fn others<'a>(
-    recording: &Recording,
-    clip: &Clip,
-    local: &[usize],
-    sketches: &'a BTreeMap<usize, Sketch>,
-    grip: &Point,
-) -> Vec<&'a Sketch> {
+fn others<'a>(footage: &Footage<'a>, clip: &Clip, local: &[usize], grip: &Point) -> Vec<&'a Sketch> {
     const COUNT: usize = 40;
-    let at_work = |f: usize| (clip.start_frame..=clip.end_frame).contains(&f) || views::interacting(recording, f);
-    let all: Vec<&Sketch> = sketches
+    let at_work = |f: usize| (clip.start_frame..=clip.end_frame).contains(&f) || footage.at_work.any(f);
+    let all: Vec<&Sketch> = footage
+        .sketches
         .values()
-        .filter(|s| !local.contains(&s.frame) && !at_work(s.frame) && sees(recording, s.frame, grip))
+        .filter(|s| !at_work(s.frame) && !local.contains(&s.frame) && sees(footage.recording, s.frame, grip))
         .collect();
     (0..all.len().min(COUNT)).map(|i| all[i * all.len() / all.len().min(COUNT)]).collect()
 }
@@ -137,10 +159,10 @@ fn others<'a>(
 pub fn points(recording: &Recording, sketch: &Sketch, class: Option<u8>) -> Vec<Point> {
     let pose = &recording.frames[sketch.frame].world_from_camera;
     let factor = recording.depth_factor(sketch.frame);
-    let width = sketch.depth.width;
+    let width = sketch.depth_mm.width;
     let mut out = Vec::new();
-    for i in 0..sketch.depth.data.len() {
-        if sketch.has_mask && class.is_some_and(|c| sketch.class.data[i] != c) {
+    for i in 0..sketch.depth_mm.data.len() {
+        if sketch.class.as_ref().zip(class).is_some_and(|(of, c)| of.data[i] != c) {
             continue;
         }
         if let Some(p) = sketch.point(&recording.camera, i % width, i / width) {
@@ -156,6 +178,7 @@ pub fn local_frames(
     recording: &Recording,
     clip: &Clip,
     trajectory: &Trajectory,
+    at_work: &AtWork,
     config: &config::Localization,
 ) -> Vec<usize> {
     let grip = &trajectory.closed_grip();
@@ -165,11 +188,6 @@ pub fn local_frames(
         let active: Vec<usize> = (first..=last).filter(usable).collect();
         return spread(&active, config.local_frames);
     }
-    let in_other_clip = |frame: usize| {
-        recording.clips.iter().any(|c| {
-            c.clip != clip.clip && (c.start_frame..=c.end_frame).contains(&frame) && c.end_frame > c.start_frame
-        })
-    };
     // Twice as many neighbours as needed, thinned evenly: viewpoints differ and one bad frame does not decide.
     let want = 2 * config.local_frames;
     // A hand that was not seen to take hold may have moved the part before it was seen: the narration tells where.
@@ -179,9 +197,9 @@ pub fn local_frames(
     ];
     let mut chosen: Vec<usize> = match trajectory.action {
         // The first moment of contact has not moved the part yet.
-        Action::Open => (0..=begin.min(last)).rev().filter(|f| !in_other_clip(*f)).filter(usable).take(want).collect(),
+        Action::Open => (0..=begin.min(last)).rev().filter(|f| !at_work.other(*f, clip)).filter(usable).take(want).collect(),
         Action::Close => (end.max(first)..recording.frames.len())
-            .take_while(|f| !in_other_clip(*f))
+            .take_while(|f| !at_work.other(*f, clip))
             .filter(usable)
             .take(want)
             .collect(),
@@ -216,7 +234,7 @@ fn touched_class(recording: &Recording, images: &[&Sketch], grip: &Point) -> Opt
     const RADIUS_M: f64 = 0.06;
     const DEPTH_M: f64 = 0.12;
     let mut votes: BTreeMap<u8, usize> = BTreeMap::new();
-    for sketch in images.iter().filter(|s| s.has_mask) {
+    for (sketch, classes) in images.iter().filter_map(|s| Some((s, s.class.as_ref()?))) {
         let local = recording.frames[sketch.frame].world_from_camera.inverse() * grip;
         let Some((u, v)) = recording.camera.project(&local) else { continue };
         let radius = (RADIUS_M / local.z * recording.camera.fx).clamp(3.0, 160.0);
@@ -226,8 +244,8 @@ fn touched_class(recording: &Recording, images: &[&Sketch], grip: &Point) -> Opt
         for dy in -reach..=reach {
             for dx in -reach..=reach {
                 let Some((x, y)) = sketch.sample(u + dx as f64 * step, v + dy as f64 * step) else { continue };
-                let i = y * sketch.depth.width + x;
-                let (class, z) = (sketch.class.data[i], f64::from(sketch.depth.data[i]) * factor);
+                let i = y * sketch.depth_mm.width + x;
+                let (class, z) = (classes.data[i], f64::from(sketch.depth_m(i)) * factor);
                 if class != 0 && class != HAND_CLASS && z > 0.0 && (z - local.z).abs() < DEPTH_M {
                     *votes.entry(class).or_default() += 1;
                 }

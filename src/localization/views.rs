@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::config;
 use crate::math::{Point, centroid};
-use crate::recording::Recording;
+use crate::recording::{AtWork, Recording};
 use crate::recording::sketch::Sketch;
 
 use super::{Region, voxels};
@@ -84,13 +84,26 @@ impl Occupancy {
     }
 }
 
-/// Selects up to `global_views` frames outside the interactions that see the region, spread over camera positions.
+/// Frames with an image in which nobody is at work: where global views are looked for. In a long recording every n-th of them:
+/// the same places are seen again and again.
+#[must_use]
+pub fn idle(recording: &Recording, at_work: &AtWork) -> Vec<usize> {
+    /// Ten minutes at 7 frames a second. So many are asked of every clip.
+    const MOST: usize = 4000;
+    let all: Vec<usize> =
+        (0..recording.frames.len()).filter(|&f| recording.frames[f].files.rgb.is_some() && !at_work.any(f)).collect();
+    let stride = all.len().div_ceil(MOST).max(1);
+    all.into_iter().step_by(stride).collect()
+}
+
+/// Selects up to `global_views` of the `idle` frames that see the region, spread over camera positions.
 ///
 /// The first is the one nearest to the region (the paper leaves the start open), each next one the farthest from all
 /// before it. With an `occupancy` a voxel counts as seen only where nothing hides it.
 #[must_use]
 pub fn reselect(
     recording: &Recording,
+    idle: &[usize],
     region: &Region,
     occupancy: Option<&Occupancy>,
     config: &config::Localization,
@@ -100,9 +113,9 @@ pub fn reselect(
     let centers = region.centers();
     let Some(middle) = centroid(&centers) else { return Vec::new() };
     let probes: Vec<Point> = centers.iter().copied().step_by(centers.len().div_ceil(PROBES)).collect();
-    let mut candidates: Vec<usize> = (0..recording.frames.len())
-        .into_par_iter()
-        .filter(|&f| recording.frames[f].files.rgb.is_some() && !interacting(recording, f))
+    let mut candidates: Vec<usize> = idle
+        .par_iter()
+        .copied()
         .filter(|&f| visible_share(recording, f, &probes, occupancy, config.min_visible_share))
         .collect();
     // The local frames show the closed state from near by, whatever the clips' bounds say.
@@ -117,16 +130,10 @@ pub fn reselect(
 
 /// Up to `count` frames outside the interactions, spread over camera positions: what the room looks like when nothing moves.
 #[must_use]
-pub fn survey(recording: &Recording, count: usize) -> Vec<usize> {
+pub fn survey(recording: &Recording, at_work: &AtWork, count: usize) -> Vec<usize> {
     let candidates: Vec<usize> =
-        (0..recording.frames.len()).filter(|&f| !interacting(recording, f) && recording.has_depth(f)).collect();
+        (0..recording.frames.len()).filter(|&f| !at_work.any(f) && recording.has_depth(f)).collect();
     spread(recording, &candidates, 0, count)
-}
-
-/// Whether a narrated interaction is going on.
-#[must_use]
-pub fn interacting(recording: &Recording, frame: usize) -> bool {
-    recording.clips.iter().any(|c| c.end_frame > c.start_frame && (c.start_frame..=c.end_frame).contains(&frame))
 }
 
 /// Farthest-point sampling over camera positions from `candidates[start]` on; ascending.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{ClipResult, Looks};
+use super::ClipResult;
 use crate::articulation::Outcome;
 use crate::config::{Config, InferenceMethod, LineMethod};
 use crate::error::Result;
@@ -12,13 +12,12 @@ use crate::geometry::segments::LiftedSegment;
 use crate::geometry::{Face, LineTrack, ManhattanFrame, candidates, face, moved, outline, sights, tracks};
 use crate::hands::{self, Trajectory};
 use crate::inference;
-use crate::localization::{self, Region, views};
+use crate::localization::{self, Footage, Region, views};
 use crate::math::Point;
 use crate::reasoning::words::{Sight, Words};
 use crate::reasoning::{self, PartShape, Question, Reasoner};
 use crate::recording::narration::{self, Reading};
-use crate::recording::sketch::Sketch;
-use crate::recording::{Clip, Recording};
+use crate::recording::{AtWork, Clip, Recording};
 
 /// A clip after its hand was followed.
 pub(super) struct Followed {
@@ -31,7 +30,7 @@ pub(super) struct Followed {
     pub(super) open: Vec<usize>,
 }
 
-pub(super) fn follow(recording: &Recording, clip: &Clip, config: &Config) -> Followed {
+pub(super) fn follow(recording: &Recording, clip: &Clip, at_work: &AtWork, config: &Config) -> Followed {
     let reading = narration::read(clip);
     let hand = if reading.moves_joint == Some(false) {
         Outcome::Abstained(format!("the narration \"{}\" moves no door or drawer", clip.narration))
@@ -40,7 +39,7 @@ pub(super) fn follow(recording: &Recording, clip: &Clip, config: &Config) -> Fol
     };
     let (closed, open) = hand.found().map_or_else(Default::default, |t| {
         let open = moved::open_frames(recording, clip, t).into_iter().map(|f| f.frame).collect();
-        (localization::local_frames(recording, clip, t, &config.localization), open)
+        (localization::local_frames(recording, clip, t, at_work, &config.localization), open)
     });
     Followed { reading, hand, closed, open }
 }
@@ -49,21 +48,30 @@ pub(super) fn follow(recording: &Recording, clip: &Clip, config: &Config) -> Fol
 pub(super) struct Located {
     reading: Reading,
     trajectory: Option<Trajectory>,
+    /// See [`ClipResult::closed_frames`].
+    closed: Vec<usize>,
     region: Option<Region>,
     pub(super) views: Vec<usize>,
     reason: Option<String>,
 }
 
+/// Localises a clip; its global views are among the `idle` frames.
 pub(super) fn locate(
-    recording: &Recording,
+    footage: &Footage,
     clip: &Clip,
     followed: Followed,
-    sketches: &BTreeMap<usize, Sketch>,
+    idle: &[usize],
     occupancy: Option<&views::Occupancy>,
     config: &Config,
 ) -> Located {
-    let mut located =
-        Located { reading: followed.reading, trajectory: None, region: None, views: Vec::new(), reason: None };
+    let mut located = Located {
+        reading: followed.reading,
+        trajectory: None,
+        closed: followed.closed,
+        region: None,
+        views: Vec::new(),
+        reason: None,
+    };
     let trajectory = match followed.hand {
         Outcome::Found(t) => t,
         Outcome::Abstained(reason) => {
@@ -71,9 +79,9 @@ pub(super) fn locate(
             return located;
         }
     };
-    match localization::localize(recording, clip, &trajectory, sketches, &config.localization) {
+    match localization::localize(footage, clip, &trajectory, &located.closed, &config.localization) {
         Outcome::Found(region) => {
-            located.views = views::reselect(recording, &region, occupancy, &config.localization);
+            located.views = views::reselect(footage.recording, idle, &region, occupancy, &config.localization);
             located.region = Some(region);
         }
         Outcome::Abstained(reason) => located.reason = Some(reason),
@@ -85,7 +93,8 @@ pub(super) fn locate(
 /// What the whole scene's views show.
 #[derive(Clone, Copy)]
 pub(super) struct Seen<'a> {
-    pub(super) looks: &'a Looks,
+    pub(super) footage: Footage<'a>,
+    pub(super) segments: &'a BTreeMap<usize, Vec<LiftedSegment>>,
     /// Triangulated lines.
     pub(super) lines: &'a [LineTrack],
     pub(super) room: Option<&'a ManhattanFrame>,
@@ -93,15 +102,16 @@ pub(super) struct Seen<'a> {
 
 /// Everything from the clip's lines to its joint.
 pub(super) fn infer(
-    recording: &Recording,
     clip: &Clip,
     located: Located,
     seen: &Seen,
     reasoner: &dyn Reasoner,
     config: &Config,
 ) -> Result<ClipResult> {
+    let Footage { recording, sketches, .. } = seen.footage;
     let mut result = ClipResult {
         trajectory: located.trajectory,
+        closed_frames: located.closed,
         region: located.region,
         views: located.views,
         ..ClipResult::unanswered(clip.clone(), located.reason.unwrap_or_default())
@@ -112,12 +122,12 @@ pub(super) fn infer(
         LineMethod::Triangulated => tracks::at_region(seen.lines, region),
         LineMethod::Unprojected => {
             let in_views: Vec<&LiftedSegment> =
-                result.views.iter().filter_map(|v| seen.looks.segments.get(v)).flatten().collect();
+                result.views.iter().filter_map(|v| seen.segments.get(v)).flatten().collect();
             tracks::unprojected(&in_views, region, &config.geometry, config.seed)
         }
     };
     result.words = reasoner.words(&Sight { recording, clip, region, views: &result.views, lines: &result.lines })?;
-    let surface = surface(recording, region, &result.views, &seen.looks.sketches, config.localization.reach_m);
+    let surface = surface(&seen.footage, clip, region, &result.views, config);
     let furniture = reasoning::furniture(&located.reading, result.words.as_ref());
     let around = face::Surroundings {
         surface: &surface,
@@ -131,7 +141,7 @@ pub(super) fn infer(
     result.face = face::fit(&around, &config.geometry, config.seed);
 
     let path = trajectory.positions();
-    let open = moved::open_views(recording, &seen.looks.sketches, clip, trajectory);
+    let open = moved::open_views(recording, sketches, clip, trajectory);
     let stops = result.face.as_ref().map_or_else(Vec::new, |f| edges_on(f, &result.lines));
     if let Some(face) = &result.face {
         result.part = outline::vote(face, &surface, &open, None, &config.fitting).moving_rect(&stops);
@@ -211,16 +221,16 @@ pub(super) fn upward(recording: &Recording, room: Option<&ManhattanFrame>) -> cr
 
 /// Points of the touched furniture: of the local frames, and of the global views where masks tell what belongs to it.
 pub(super) fn surface(
-    recording: &Recording,
+    footage: &Footage,
+    clip: &Clip,
     region: &Region,
     views: &[usize],
-    sketches: &BTreeMap<usize, Sketch>,
-    reach_m: f64,
+    config: &Config,
 ) -> Vec<Point> {
-    let mut points = region.points.clone();
-    for sketch in views.iter().filter_map(|v| sketches.get(v)) {
-        let near = |p: &Point| (p - region.grip).norm() <= reach_m;
-        points.extend(localization::points(recording, sketch, region.class).into_iter().filter(near));
+    let mut points = localization::inside(footage, clip, region, &config.localization);
+    for sketch in views.iter().filter_map(|v| footage.sketches.get(v)) {
+        let near = |p: &Point| (p - region.grip).norm() <= config.localization.reach_m;
+        points.extend(localization::points(footage.recording, sketch, region.class).into_iter().filter(near));
     }
     points
 }

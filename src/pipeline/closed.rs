@@ -33,20 +33,21 @@ impl Grip {
 
 /// How well a clip saw the closed part, to compare clips of one part: how well its front bears out where the hands of all of the
 /// part's clips were when it was closed, and how much of what is near lies on it. Of the other clips' hands the paper says nothing.
+/// A logarithm: of hundreds of clips the product is no number.
 fn trust(clips: &[ClipResult], clip: usize, grips: &[Grip], config: &Config) -> f64 {
     let (Some(face), Some(own)) = (&clips[clip].face, Grip::of(clips, clip)) else {
-        return 0.0;
+        return f64::NEG_INFINITY;
     };
     let off = |grip: &Grip| face.coordinates(&grip.at)[2] - config.geometry.grip_standoff_m;
     let moved = if clips[clip].part.is_some() { 2.0 } else { 1.0 };
     match config.inference.method {
-        InferenceMethod::Paper => at_handle(off(&own)) * (0.2 + face.support) * moved,
+        InferenceMethod::Paper => (at_handle(off(&own)) * (0.2 + face.support) * moved).ln(),
         InferenceMethod::Posterior => {
             // The face was looked for near its own hand.
             let lost_m = |grip: &Grip| if grip.clip == clip { hands::grip_std_m(false) } else { TRAVEL_M };
-            let borne_out: f64 = grips.iter().map(|g| at_front(off(g), g.seen, lost_m(g))).product();
+            let borne_out: f64 = grips.iter().map(|g| at_front(off(g), g.seen, lost_m(g)).ln()).sum();
             // A front is most of what is seen around a hand that holds it: half the support counts a quarter.
-            borne_out / own.std_m() * face.support.powi(2) * moved
+            borne_out + (face.support.powi(2) * moved / own.std_m()).ln()
         }
     }
 }
@@ -76,12 +77,13 @@ fn at_front(off: f64, seen: bool, lost_m: f64) -> f64 {
     ODD * near + if seen { (1.0 - WRONG) * at_handle(off) + WRONG * lost } else { lost }
 }
 
-/// Of a part's clips with an answer the one that saw it closed best.
-pub(super) fn best_seen(clips: &[ClipResult], members: &[usize], config: &Config) -> Option<usize> {
+/// A part's clips with an answer, the one that saw it closed best first.
+pub(super) fn by_trust(clips: &[ClipResult], members: &[usize], config: &Config) -> Vec<usize> {
     let grips: Vec<Grip> = members.iter().filter_map(|&c| Grip::of(clips, c)).collect();
     let answered = members.iter().filter(|&&c| clips[c].joint.found().is_some());
-    let trusted = answered.map(|&c| (c, trust(clips, c, &grips, config)));
-    trusted.reduce(|best, next| if next.1 > best.1 { next } else { best }).map(|(best, _)| best)
+    let mut trusted: Vec<(usize, f64)> = answered.map(|&c| (c, trust(clips, c, &grips, config))).collect();
+    trusted.sort_by(|a, b| b.1.total_cmp(&a.1));
+    trusted.into_iter().map(|(clip, _)| clip).collect()
 }
 
 #[cfg(test)]
@@ -128,7 +130,7 @@ mod tests {
 
     fn trusts(clips: &[ClipResult]) -> Vec<f64> {
         let grips: Vec<Grip> = (0..clips.len()).filter_map(|c| Grip::of(clips, c)).collect();
-        (0..clips.len()).map(|c| trust(clips, c, &grips, &Config::default())).collect()
+        (0..clips.len()).map(|c| trust(clips, c, &grips, &Config::default()).exp()).collect()
     }
 
     #[test]
@@ -150,15 +152,24 @@ mod tests {
         let [lost, seen] = [two(false), two(true)].map(|t| t[0] / t[1]);
         assert!(lost > 2.0 && seen > 2.0 * lost, "{lost} {seen}");
         // The paper asks no other clip's hand, and a thin front may do.
-        let paper = |grips: &[Grip]| trust(&[clip(0.0, 0.0, 0.2, true)], 0, grips, &Config::paper());
+        let paper = |grips: &[Grip]| trust(&[clip(0.0, 0.0, 0.2, true)], 0, grips, &Config::paper()).exp();
         let behind = Grip { clip: 1, at: Point::new(0.0, 0.3, 0.0), seen: true };
         assert!((paper(&[]) - 0.4).abs() < 1e-9 && (paper(&[behind]) - 0.4).abs() < 1e-9, "{}", paper(&[]));
     }
 
     #[test]
+    fn of_a_thousand_clips_the_best_is_found_too() {
+        let mut clips: Vec<ClipResult> = (0..1000).map(|_| clip(0.3, 0.2, 0.2, true)).collect();
+        clips[700] = clip(0.0, 0.0, 0.9, true);
+        let members: Vec<usize> = (0..1000).collect();
+        assert_ne!(by_trust(&clips, &members, &Config::default())[0], 0);
+        assert!(trusts(&clips).iter().all(|t| *t == 0.0), "the product underflows");
+    }
+
+    #[test]
     fn a_clip_that_is_trusted_most_but_has_no_answer_gives_no_front() {
         let mut clips = [clip(0.0, 0.0, 0.4, true), clip(0.0, 0.0, 0.2, true)];
-        let best = |clips: &[ClipResult]| best_seen(clips, &[0, 1], &Config::default());
+        let best = |clips: &[ClipResult]| by_trust(clips, &[0, 1], &Config::default()).first().copied();
         assert_eq!(best(&clips), Some(0));
         clips[0].joint = Outcome::Abstained("no direction for a slide".to_owned());
         assert_eq!(best(&clips), Some(1));

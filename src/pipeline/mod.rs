@@ -20,12 +20,12 @@ use crate::geometry::segments::{LiftedSegment, LineDetector, lift};
 use crate::geometry::{AxisCandidate, Face, LineTrack, ManhattanFrame, depth_scale, manhattan, tracks};
 use crate::hands::Trajectory;
 use crate::inference::{ClipJoint, Uncertainty};
-use crate::localization::{Region, views};
+use crate::localization::{Footage, Region, views};
 use crate::math::Point;
 use crate::reasoning::words::Words;
 use crate::reasoning::{Answer, Reasoner};
 use crate::recording::sketch::Sketch;
-use crate::recording::{Clip, DepthFactors, Recording};
+use crate::recording::{AtWork, Clip, DepthFactors, Recording};
 pub use room::{RoomCell, RoomCells};
 
 /// Everything that was found out about one clip, step by step.
@@ -35,6 +35,9 @@ pub struct ClipResult {
     pub clip: Clip,
     /// Hands (§3.1).
     pub trajectory: Option<Trajectory>,
+    /// Frames in which the furniture is closed and the grip is seen (§3.1).
+    #[serde(skip)]
+    pub closed_frames: Vec<usize>,
     /// Localisation (§3.1).
     pub region: Option<Region>,
     /// Global views (§3.2).
@@ -62,6 +65,7 @@ impl ClipResult {
         Self {
             clip,
             trajectory: None,
+            closed_frames: Vec::new(),
             region: None,
             views: Vec::new(),
             lines: Vec::new(),
@@ -222,8 +226,9 @@ pub fn infer(
     };
 
     // Hands, clip by clip; they tell which frames are needed.
+    let at_work = AtWork::of(recording);
     let followed: Vec<clip::Followed> =
-        recording.clips.par_iter().map(|clip| clip::follow(recording, clip, config)).collect();
+        recording.clips.par_iter().map(|clip| clip::follow(recording, clip, &at_work, config)).collect();
 
     let mut looks = Looks::default();
     let look = |looks: &mut Looks, frames: Vec<usize>, lines: bool| -> Result<()> {
@@ -254,7 +259,7 @@ pub fn infer(
 
     let mut still: Vec<usize> = followed.iter().flat_map(|f| f.closed.iter().copied()).collect();
     if config.localization.closed_state_frames || config.geometry.depth_scale {
-        still.extend(views::survey(recording, config.localization.survey_frames));
+        still.extend(views::survey(recording, &at_work, config.localization.survey_frames));
     }
     look(&mut looks, still, true)?;
     look(&mut looks, followed.iter().flat_map(|f| f.open.iter().copied()).collect(), false)?;
@@ -262,12 +267,14 @@ pub fn infer(
     let total = recording.clips.len();
     start("localising", total);
     let occupancy = config.localization.occlusion.then(|| views::Occupancy::of(&rectified, &looks.sketches));
+    let idle = views::idle(recording, &at_work);
+    let footage = Footage { recording: &rectified, sketches: &looks.sketches, at_work: &at_work };
     let located: Vec<clip::Located> = recording
         .clips
         .par_iter()
         .zip(followed)
         .map(|(clip, followed)| {
-            let located = clip::locate(&rectified, clip, followed, &looks.sketches, occupancy.as_ref(), config);
+            let located = clip::locate(&footage, clip, followed, &idle, occupancy.as_ref(), config);
             tick("localising", total);
             located
         })
@@ -293,25 +300,21 @@ pub fn infer(
     let room = manhattan::estimate(&rectified, &with_normals_first(recording, &wanted), &config.geometry)?;
 
     start("inferring", total);
-    let seen = clip::Seen { looks: &looks, lines: &lines, room: room.as_ref() };
+    let footage = Footage { recording: &rectified, sketches: &looks.sketches, at_work: &at_work };
+    let seen = clip::Seen { footage, segments: &looks.segments, lines: &lines, room: room.as_ref() };
     let clips: Vec<ClipResult> = recording
         .clips
         .par_iter()
         .zip(located)
         .map(|(clip, located)| {
-            let result = clip::infer(&rectified, clip, located, &seen, reasoner, config);
+            let result = clip::infer(clip, located, &seen, reasoner, config);
             tick("inferring", total);
             result
         })
         .collect::<Result<_>>()?;
-    let joints = scene::merge(&rectified, &looks.sketches, &clips, reasoner, config);
-    let surroundings = room::cells(
-        &rectified,
-        &looks.sketches,
-        room.as_ref(),
-        &clip::upward(&rectified, room.as_ref()),
-        &config.fitting,
-    );
+    let joints = scene::merge(&footage, &clips, reasoner, config);
+    let up = clip::upward(&rectified, room.as_ref());
+    let surroundings = room::cells(&footage, room.as_ref(), &up, &config.fitting);
     let Recording { name: recording, depth_factors, .. } = rectified;
     Ok(Scene { recording, manhattan: room, depth_factors, clips, joints, surroundings })
 }

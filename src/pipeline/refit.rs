@@ -1,7 +1,5 @@
 //! A joint of the scene once more, from the depth of all its clips' open states: where its hinge is, how far each clip went.
 
-use std::collections::BTreeMap;
-
 use super::ClipResult;
 use crate::articulation::{Action, Articulation};
 use crate::config::Config;
@@ -13,10 +11,9 @@ use crate::geometry::{AxisSource, Face, Rect, candidates, front, outline};
 use crate::hands::{self, Trajectory};
 use crate::inference;
 use crate::inference::uncertainty::OpenStates;
-use crate::localization;
+use crate::localization::Footage;
 use crate::math::{Point, stats};
-use crate::recording::sketch::Sketch;
-use crate::recording::{Clip, Recording};
+use crate::recording::Clip;
 
 /// Error of a place that no number of views makes smaller, metres: depth is off alike wherever the same surface is seen from
 /// about the same distance.
@@ -74,20 +71,20 @@ impl Believed {
 
 /// The hinge and the openings that the depth of the open states tells. `None` where they were not seen.
 pub(super) fn refitted<'a>(
-    recording: &Recording,
-    sketches: &'a BTreeMap<usize, Sketch>,
+    footage: &Footage<'a>,
     shown: &[(&ClipResult, &Trajectory)],
     believed: &Believed,
     closed: &Closed,
     config: &Config,
 ) -> Option<Refitted<'a>> {
     let Closed { face, rect, .. } = closed;
+    let Footage { recording, sketches, .. } = *footage;
     let joint = &believed.joint;
     let noise = openings::Noise { hinge_m: believed.hinge_m, board_m: config.fitting.board_m };
     let views: Vec<Vec<moved::View>> =
         shown.iter().map(|(clip, t)| moved::open_views(recording, sketches, &clip.clip, t)).collect();
     let still: Vec<Vec<moved::View>> =
-        shown.iter().map(|(clip, t)| closed_views(recording, sketches, &clip.clip, t, config)).collect();
+        shown.iter().map(|(clip, t)| closed_views(footage, clip, t, config)).collect();
     let states: Vec<OpenState> = shown
         .iter()
         .zip(views.iter().zip(&still))
@@ -174,9 +171,8 @@ fn open_end(joint: &Articulation, trajectory: &Trajectory, state: &OpenState, se
 
 /// The views of the closed state between which and the hand nothing else was moved.
 fn closed_views<'a>(
-    recording: &Recording,
-    sketches: &'a BTreeMap<usize, Sketch>,
-    clip: &Clip,
+    footage: &Footage<'a>,
+    shown: &ClipResult,
     trajectory: &Trajectory,
     config: &Config,
 ) -> Vec<moved::View<'a>> {
@@ -185,9 +181,12 @@ fn closed_views<'a>(
     if !config.localization.closed_state_frames {
         return Vec::new();
     }
-    let between = |c: &Clip, frame: usize| c.clip != clip.clip && c.start_frame < first && c.end_frame > frame;
-    let frames: Vec<moved::OpenFrame> = localization::local_frames(recording, clip, trajectory, &config.localization)
-        .into_iter()
+    let Footage { recording, sketches, .. } = *footage;
+    let between = |c: &Clip, frame: usize| c.start_frame < first && c.end_frame > frame && c.clip != shown.clip.clip;
+    let frames: Vec<moved::OpenFrame> = shown
+        .closed_frames
+        .iter()
+        .copied()
         .filter(|&frame| match trajectory.action {
             Action::Open => frame <= last && !recording.clips.iter().any(|c| between(c, frame)),
             Action::Close => frame >= first,

@@ -1,16 +1,12 @@
 //! What stands around and does not move: cells of a grid in which several views saw a surface (ours).
 
-use std::collections::BTreeMap;
-
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::config;
 use crate::geometry::ManhattanFrame;
-use crate::localization::{self, views};
+use crate::localization::{self, Footage};
 use crate::math::{Point, Vector, any_orthogonal, reject, unit};
-use crate::recording::Recording;
-use crate::recording::sketch::Sketch;
 
 /// One cell with a surface in it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -40,8 +36,7 @@ pub struct RoomCells {
 ///
 /// Parts that were left open are in it: whoever builds them knows where they go and leaves that space free.
 pub(super) fn cells(
-    recording: &Recording,
-    sketches: &BTreeMap<usize, Sketch>,
+    footage: &Footage,
     manhattan: Option<&ManhattanFrame>,
     up: &Vector,
     config: &config::Fitting,
@@ -53,12 +48,13 @@ pub(super) fn cells(
     if !config.room {
         return None;
     }
+    let Footage { recording, sketches, at_work } = *footage;
     let axes = grid_axes(manhattan, up);
     let edge_m = config.room_voxel_m;
     let needed = config.room_min_views as u32;
     // A frame without depth of its own has the reconstruction's, which is taken whole below.
     let still = |frame: usize| {
-        !views::interacting(recording, frame) && recording.frames.get(frame).is_some_and(|f| f.files.depth.is_some())
+        !at_work.any(frame) && recording.frames.get(frame).is_some_and(|f| f.files.depth.is_some())
     };
     let by_view: Vec<Vec<Bin>> = sketches
         .par_iter()

@@ -1,11 +1,9 @@
 //! Clips of one part to one joint of the scene (§C.2).
 
-use std::collections::BTreeMap;
-
 use rayon::prelude::*;
 
 use super::clip::{self, part_shape};
-use super::closed::{Grip, best_seen};
+use super::closed::{Grip, by_trust};
 use super::refit;
 use super::{ClipResult, Hypothesis, SceneJoint, told};
 use crate::articulation::{Articulation, JointKind};
@@ -15,19 +13,17 @@ use crate::geometry::sights::{self, Sights};
 use crate::geometry::{AxisCandidate, AxisSource, Face, candidates, front, moved, outline};
 use crate::hands::{self, Trajectory};
 use crate::inference::{self, aggregate, uncertainty};
+use crate::localization::Footage;
 use crate::math::Point;
 use crate::reasoning::{Answer, Question, Reasoner};
-use crate::recording::Recording;
 use crate::recording::narration;
-use crate::recording::sketch::Sketch;
 
 /// Probability of its type above which a joint's hinge tells two parts apart.
 const SURE: f64 = 0.7;
 
 /// Clips to scene-level joints (§C.2).
 pub(super) fn merge(
-    recording: &Recording,
-    sketches: &BTreeMap<usize, Sketch>,
+    footage: &Footage,
     clips: &[ClipResult],
     reasoner: &dyn Reasoner,
     config: &Config,
@@ -64,8 +60,8 @@ pub(super) fn merge(
         .map(|g| g.into_iter().map(|i| seen[i].0).collect::<Vec<usize>>())
         .filter(|g| g.iter().any(|&c| clips[c].joint.found().is_some()))
         .collect();
-    let first = merged(recording, sketches, clips, &groups, reasoner, config);
-    let again = |groups: &[Vec<usize>]| merged(recording, sketches, clips, groups, reasoner, config);
+    let first = merged(footage, clips, &groups, reasoner, config);
+    let again = |groups: &[Vec<usize>]| merged(footage, clips, groups, reasoner, config);
     let mut joints: Vec<SceneJoint> =
         regrouped(first, clips, again, config).into_iter().map(|(_, joint)| joint).collect();
     for (i, joint) in joints.iter_mut().enumerate() {
@@ -129,8 +125,7 @@ fn regrouped(
 
 /// The groups that have a joint, and it.
 fn merged(
-    recording: &Recording,
-    sketches: &BTreeMap<usize, Sketch>,
+    footage: &Footage,
     clips: &[ClipResult],
     groups: &[Vec<usize>],
     reasoner: &dyn Reasoner,
@@ -139,14 +134,18 @@ fn merged(
     groups
         .par_iter()
         .filter_map(|members| {
-            let joint = merge_group(&Group { recording, sketches, clips, members, config }, reasoner)?;
+            let joint = merge_group(&Group { footage: *footage, clips, members, config }, reasoner)?;
             Some((members.clone(), joint))
         })
         .collect()
 }
 
-/// The candidates of all clips of a part as far as they fit the face of the clip that saw it best. Where outlines are known,
-/// their sides stand for those of the clips' own ones.
+/// So many clips of a part, those that saw it closed best, offer their candidates. All clips judge them, so that the work grows
+/// with the number of clips; more would offer the same again.
+const OFFERING: usize = 6;
+
+/// The candidates of the clips of a part (`group`, the one that saw it best among them) as far as they fit the face of that one.
+/// Where outlines are known, their sides stand for those of the clips' own ones.
 fn pooled(
     clips: &[ClipResult],
     group: &[usize],
@@ -228,8 +227,7 @@ fn likely(candidates: &[AxisCandidate], answer: &Answer, merged: bool) -> Vec<Li
 /// Clips of one part, and what they are judged with.
 #[derive(Clone, Copy)]
 struct Group<'a> {
-    recording: &'a Recording,
-    sketches: &'a BTreeMap<usize, Sketch>,
+    footage: Footage<'a>,
     clips: &'a [ClipResult],
     /// Indices into `clips`.
     members: &'a [usize],
@@ -293,9 +291,10 @@ fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
 /// falling likelihood; none in a first look, which takes what that clip knows. Every candidate is judged under the outline
 /// that suits it best.
 fn judged(group: &Group, reasoner: &dyn Reasoner, outlines: &[Rect]) -> Option<Judged> {
-    let Group { recording, sketches, clips, members, config } = *group;
+    let Group { footage: Footage { recording, sketches, .. }, clips, members, config } = *group;
     // The clip that saw the closed part best gives the face, the grip and the part's outline.
-    let best = best_seen(clips, members, config)?;
+    let trusted = by_trust(clips, members, config);
+    let best = *trusted.first()?;
     let best_joint = clips[best].joint.found()?;
     let grip = best_joint.grip;
     let best_std_m = Grip::of(clips, best)?.std_m();
@@ -312,7 +311,11 @@ fn judged(group: &Group, reasoner: &dyn Reasoner, outlines: &[Rect]) -> Option<J
     } else if !judged_before {
         let paths: Vec<Vec<Point>> =
             members.iter().filter_map(|&c| clips[c].trajectory.as_ref()).map(Trajectory::positions).collect();
-        let pooled: Vec<AxisCandidate> = pooled(clips, members, best, &grip, outlines, &config.inference)
+        let mut offering: Vec<usize> = members.to_vec();
+        if members.len() > OFFERING {
+            offering.retain(|c| trusted.iter().take(OFFERING).any(|t| t == c));
+        }
+        let pooled: Vec<AxisCandidate> = pooled(clips, &offering, best, &grip, outlines, &config.inference)
             .iter()
             .map(|c| candidates::settled(c, &paths, &config.reasoning))
             .collect();
@@ -398,11 +401,10 @@ struct Around {
 
 /// Of the clip that saw the closed part best.
 fn around(group: &Group, best: usize) -> Around {
-    let (clip, reach_m) = (&group.clips[best], group.config.localization.reach_m);
-    let surface = clip
-        .region
-        .as_ref()
-        .map_or_else(Vec::new, |region| clip::surface(group.recording, region, &clip.views, group.sketches, reach_m));
+    let clip = &group.clips[best];
+    let surface = clip.region.as_ref().map_or_else(Vec::new, |region| {
+        clip::surface(&group.footage, &clip.clip, region, &clip.views, group.config)
+    });
     Around { surface, stops: clip.face.as_ref().map_or_else(Vec::new, |face| clip::edges_on(face, &clip.lines)) }
 }
 
@@ -412,7 +414,7 @@ const ROUNDS: usize = 2;
 
 /// A part under one of its joints: which way it opens, then hinge, openings and outline from the depth of the open state.
 fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around, rounds: usize) -> Hypothesis {
-    let Group { recording, sketches, clips, config, .. } = *group;
+    let Group { footage, clips, config, .. } = *group;
     let (best, face) = (judged.best, clips[judged.best].face);
     let shown = group.shown();
     let trajectories = shown.iter().map(|(_, t)| *t);
@@ -435,7 +437,7 @@ fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around, round
         let mut believed = start;
         for _ in 0..rounds {
             let closed = refit::Closed { face, rect, surface: &around.surface };
-            let Some(fit) = refit::refitted(recording, sketches, &shown, &believed, &closed, config) else { break };
+            let Some(fit) = refit::refitted(&footage, &shown, &believed, &closed, config) else { break };
             // With the openings known better the part's outline is, too.
             let seen = front::Seen {
                 face: &face,

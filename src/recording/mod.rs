@@ -2,6 +2,7 @@
 //!
 //! The layout on disk is described in `docs/recording-format.md`.
 
+pub mod at_work;
 pub mod grid;
 pub mod images;
 pub mod narration;
@@ -17,6 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
 use crate::math::{Point, Pose, Vector};
+pub use at_work::AtWork;
 pub use grid::Grid;
 
 /// Class of a hand's pixel in a mask.
@@ -260,6 +262,14 @@ impl Recording {
     /// A line detector's own segments. `None` where the frame has no such file.
     pub fn segments(&self, frame: usize) -> Result<Option<Vec<segments::Ends>>> {
         self.frames.get(frame).and_then(|f| f.files.segments.as_deref()).map(segments::read).transpose()
+    }
+
+    /// The hands of frames `from..=to`; [`Recording::hands`] are in the order of frames.
+    #[must_use]
+    pub fn hands_in(&self, from: usize, to: usize) -> &[HandSample] {
+        let first = self.hands.partition_point(|h| h.frame < from);
+        let end = self.hands.partition_point(|h| h.frame <= to);
+        self.hands.get(first..end).unwrap_or_default()
     }
 
     fn read<T>(

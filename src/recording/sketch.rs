@@ -13,12 +13,11 @@ pub struct Sketch {
     pub frame: usize,
     /// Pixels between samples.
     pub step: usize,
-    /// Depth along the optical axis as read (no factor applied), metres; 0 = none, or a hand.
-    pub depth: Grid<f32>,
-    /// Mask class; 0 where there is no mask.
-    pub class: Grid<u8>,
-    /// Whether the frame has a mask.
-    pub has_mask: bool,
+    /// Depth along the optical axis as read (no factor applied), millimetres, as recordings on disk have it; 0 = none, or a hand.
+    /// A long recording keeps ten thousands of sketches.
+    pub depth_mm: Grid<u16>,
+    /// Mask class; `None` where the frame has no mask.
+    pub class: Option<Grid<u8>>,
 }
 
 impl Sketch {
@@ -27,25 +26,30 @@ impl Sketch {
     pub fn of(frame: usize, depth: &Grid<f32>, mask: Option<&Grid<u8>>) -> Self {
         let step = ((depth.data.len() as f64 / MAX_SAMPLES as f64).sqrt().ceil() as usize).max(1);
         let (width, height) = (depth.width / step, depth.height / step);
-        let mut out = Self {
-            frame,
-            step,
-            depth: Grid::filled(width, height, 0.0),
-            class: Grid::filled(width, height, 0),
-            has_mask: mask.is_some(),
-        };
+        let source = |x: usize, y: usize| (y * step + step / 2) * depth.width + x * step + step / 2;
+        let mut depth_mm = Grid::filled(width, height, 0u16);
         for y in 0..height {
             for x in 0..width {
-                let source = (y * step + step / 2) * depth.width + x * step + step / 2;
-                let class = mask.map_or(0, |m| m.data[source]);
-                let z = depth.data[source];
-                out.class.data[y * width + x] = class;
-                if z > 0.0 && z.is_finite() && class != HAND_CLASS {
-                    out.depth.data[y * width + x] = z;
+                let z = depth.data[source(x, y)];
+                let hand = mask.is_some_and(|m| m.data[source(x, y)] == HAND_CLASS);
+                // Beyond the range of 16 bits, 65 m, is out of the window.
+                let mm = (1000.0 * z).round();
+                if mm > 0.0 && mm <= f32::from(u16::MAX) && !hand {
+                    depth_mm.data[y * width + x] = mm as u16;
                 }
             }
         }
-        out
+        let class = mask.map(|m| {
+            let rows = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+            Grid { width, height, data: rows.map(|(x, y)| m.data[source(x, y)]).collect() }
+        });
+        Self { frame, step, depth_mm, class }
+    }
+
+    /// Depth of the sample with this index, along the optical axis as read, metres; 0 = none.
+    #[must_use]
+    pub fn depth_m(&self, index: usize) -> f32 {
+        f32::from(self.depth_mm.data[index]) * 1e-3
     }
 
     /// Pixel of the full image at sample (x, y).
@@ -66,8 +70,8 @@ impl Sketch {
     pub fn camera(&self, full: &Camera) -> Camera {
         let (step, first) = (self.step as f64, (self.step / 2) as f64);
         Camera {
-            width: self.depth.width,
-            height: self.depth.height,
+            width: self.depth_mm.width,
+            height: self.depth_mm.height,
             fx: full.fx / step,
             fy: full.fy / step,
             cx: (full.cx - first) / step,
@@ -82,13 +86,13 @@ impl Sketch {
         let (x, y) = (x + 0.5, y + 0.5);
         (x >= 0.0 && y >= 0.0)
             .then_some((x as usize, y as usize))
-            .filter(|(x, y)| *x < self.depth.width && *y < self.depth.height)
+            .filter(|(x, y)| *x < self.depth_mm.width && *y < self.depth_mm.height)
     }
 
     /// Point of a sample in the camera frame, with depth as read; `None` where there is none.
     #[must_use]
     pub fn point(&self, camera: &Camera, x: usize, y: usize) -> Option<Point> {
-        let z = f64::from(self.depth.data[y * self.depth.width + x]);
+        let z = f64::from(self.depth_m(y * self.depth_mm.width + x));
         let (u, v) = self.pixel(x, y);
         (z > 0.0).then(|| camera.unproject(u, v, z))
     }
@@ -100,7 +104,7 @@ impl Sketch {
         let centre = self.point(camera, x, y)?;
         let (x0, y0) = (x.checked_sub(reach)?, y.checked_sub(reach)?);
         let (x1, y1) = (x + reach, y + reach);
-        if x1 >= self.depth.width || y1 >= self.depth.height {
+        if x1 >= self.depth_mm.width || y1 >= self.depth_mm.height {
             return None;
         }
         let (left, right) = (self.point(camera, x0, y)?, self.point(camera, x1, y)?);
@@ -132,9 +136,10 @@ mod tests {
             }
         }
         let sketch = Sketch::of(0, &depth, None);
-        assert!(sketch.depth.data.len() <= MAX_SAMPLES);
+        assert!(sketch.depth_mm.data.len() <= MAX_SAMPLES);
         let p = sketch.point(&camera, 10, 20).unwrap();
-        assert!((normal.dot(&p.coords) + 2.0).abs() < 1e-5);
+        // Depth is kept to the millimetre.
+        assert!((normal.dot(&p.coords) + 2.0).abs() < 5e-4);
         let (u, v) = sketch.pixel(10, 20);
         assert_eq!(sketch.sample(u, v), Some((10, 20)));
         assert!((sketch.camera(&camera).unproject(10.0, 20.0, p.z) - p).norm() < 1e-12);
