@@ -1,6 +1,6 @@
 //! Frustum test and farthest-point reselection of global views (§3.2, §A.3).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use rayon::prelude::*;
 
@@ -25,26 +25,42 @@ impl Occupancy {
     /// More cells than a house of 20 x 20 x 4 m has: a scene with a stray point far away is not gridded whole.
     const MAX_CELLS: usize = 8_000_000;
     /// Views that must agree on a surface; one may show somebody's arm.
-    const VIEWS: u16 = 3;
+    const VIEWS: u32 = 3;
 
     /// From the depth of all frames that were looked at.
     #[must_use]
     pub fn of(recording: &Recording, sketches: &BTreeMap<usize, Sketch>) -> Self {
         let cells = |p: &Point| voxels::index(p, Self::CELL_M);
-        let clouds: Vec<Vec<[i32; 3]>> = sketches
-            .par_iter()
-            .map(|(_, sketch)| {
-                let mut seen: Vec<[i32; 3]> =
-                    super::points(recording, sketch, None).iter().step_by(3).map(cells).collect();
-                seen.sort_unstable();
-                seen.dedup();
-                seen
-            })
-            .collect();
-        let all = || clouds.iter().flatten();
-        let bound = |k: usize, q: f64| {
-            let values: Vec<f64> = all().map(|c| f64::from(c[k])).collect();
-            crate::math::stats::quantile(&values, q).unwrap_or(0.0) as i32
+        let sketches: Vec<&Sketch> = sketches.values().collect();
+        // Views that see each cell.
+        let mut seen: HashMap<[i32; 3], u32> = HashMap::new();
+        for some in sketches.chunks(64) {
+            let clouds: Vec<Vec<[i32; 3]>> = some
+                .par_iter()
+                .map(|sketch| {
+                    let mut seen: Vec<[i32; 3]> =
+                        super::points(recording, sketch, None).iter().step_by(3).map(cells).collect();
+                    seen.sort_unstable();
+                    seen.dedup();
+                    seen
+                })
+                .collect();
+            for cell in clouds.into_iter().flatten() {
+                *seen.entry(cell).or_default() += 1;
+            }
+        }
+        let bound = |k: usize, q: f64| -> i32 {
+            let mut along: BTreeMap<i32, u64> = BTreeMap::new();
+            for (cell, views) in &seen {
+                *along.entry(cell[k]).or_default() += u64::from(*views);
+            }
+            let rank = (q * along.values().sum::<u64>() as f64) as u64;
+            let mut below = 0;
+            let at = along.iter().find(|(_, views)| {
+                below += **views;
+                below > rank
+            });
+            at.map_or(0, |(at, _)| *at)
         };
         let low = [0, 1, 2].map(|k| bound(k, 0.002));
         let size = [0, 1, 2].map(|k| (bound(k, 0.998) - low[k] + 1).max(1) as usize);
@@ -52,13 +68,13 @@ impl Occupancy {
             return Self { low, size: [0; 3], full: Vec::new() };
         }
         let mut grid = Self { low, size, full: Vec::new() };
-        let mut counts = vec![0u16; size.iter().product()];
-        for cell in all() {
+        let mut full = vec![false; size.iter().product()];
+        for (cell, _) in seen.iter().filter(|(_, views)| **views >= Self::VIEWS) {
             if let Some(i) = grid.index(cell) {
-                counts[i] = counts[i].saturating_add(1);
+                full[i] = true;
             }
         }
-        grid.full = counts.into_iter().map(|n| n >= Self::VIEWS).collect();
+        grid.full = full;
         grid
     }
 

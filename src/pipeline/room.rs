@@ -7,6 +7,7 @@ use crate::config;
 use crate::geometry::ManhattanFrame;
 use crate::localization::{self, Footage};
 use crate::math::{Point, Vector, any_orthogonal, reject, unit};
+use crate::recording::sketch::Sketch;
 
 /// One cell with a surface in it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -56,17 +57,22 @@ pub(super) fn cells(
     let still = |frame: usize| {
         !at_work.any(frame) && recording.frames.get(frame).is_some_and(|f| f.files.depth.is_some())
     };
-    let by_view: Vec<Vec<Bin>> = sketches
-        .par_iter()
-        .filter(|(frame, _)| still(**frame))
-        .map(|(frame, sketch)| {
-            let eye = recording.frames[*frame].center();
-            let points = localization::points(recording, sketch, None);
-            let near = points.iter().step_by(STRIDE).filter(|p| (*p - eye).norm() <= NEAR_M);
-            folded(near.filter_map(|p| Bin::of(p, &axes, edge_m, 1)).collect(), |one, _| one)
-        })
-        .collect();
-    let mut bins: Vec<Bin> = by_view.into_iter().flatten().collect();
+    let still: Vec<&Sketch> = sketches.values().filter(|s| still(s.frame)).collect();
+    let mut bins: Vec<Bin> = Vec::new();
+    // In pieces: the bins of all views of a long recording together are larger than the room by far.
+    for some in still.chunks(64) {
+        let by_view: Vec<Vec<Bin>> = some
+            .par_iter()
+            .map(|sketch| {
+                let eye = recording.frames[sketch.frame].center();
+                let points = localization::points(recording, sketch, None);
+                let near = points.iter().step_by(STRIDE).filter(|p| (*p - eye).norm() <= NEAR_M);
+                folded(near.filter_map(|p| Bin::of(p, &axes, edge_m, 1)).collect(), |one, _| one)
+            })
+            .collect();
+        bins.extend(by_view.into_iter().flatten());
+        bins = folded(bins, u32::saturating_add);
+    }
     // A reconstruction has been through many views already. In pieces: it may have millions of points.
     for points in recording.reconstruction.chunks(1 << 16) {
         bins.extend(folded(points.iter().filter_map(|p| Bin::of(p, &axes, edge_m, needed)).collect(), |one, _| one));
