@@ -67,6 +67,11 @@ fn kind_of(path: &Path) -> anyhow::Result<Given> {
     match (value.get("furniture").is_some(), value.get("joints").is_some()) {
         (true, _) => Ok(Given::Twin),
         (false, true) => Ok(Given::Joints),
+        (false, false) if value.is_array() => bail!(
+            "{}: is a list; an object is wanted, with \"furniture\" (a twin) or with \"scene\" and \"joints\" \
+             (docs/joints-format.md)",
+            shown(path)
+        ),
         (false, false) => bail!(
             "{}: neither a twin (it has no \"furniture\") nor joints (it has no \"joints\"; see docs/joints-format.md)",
             shown(path)

@@ -198,10 +198,16 @@ impl<'de> Deserializer<'de> for Node<'_, 'de> {
     fn deserialize_struct<V: Visitor<'de>>(
         self,
         _: &'static str,
-        _: &'static [&'static str],
+        fields: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Fault> {
-        self.object(visitor)
+        if self.value.is_object() {
+            return self.object(visitor);
+        }
+        // serde would take a list for the fields in their order.
+        let keys: Vec<String> = fields.iter().map(|key| format!("\"{key}\"")).collect();
+        let message = format!("{} is given, an object with {} is wanted", given(self.value), keys.join(", "));
+        Err(Fault { place: Some(self.place.to_string()), message })
     }
 
     fn deserialize_enum<V: Visitor<'de>>(
@@ -306,7 +312,7 @@ fn wanted(expected: &str) -> String {
     let length = expected.strip_prefix("an array of length ").or_else(|| expected.strip_prefix("a tuple of size "));
     match expected {
         _ if length.is_some() => format!("a list of {} values", length.unwrap_or_default()),
-        _ if expected.starts_with("struct ") || expected == "a map" => "an object {...}".to_owned(),
+        "a map" => "an object {...}".to_owned(),
         "a sequence" => "a list [...]".to_owned(),
         "a matrix array" => "a list of numbers, as many as it has coordinates (a point or a direction: 3)".to_owned(),
         "a string" | "string or map" => "a text in quotes".to_owned(),
@@ -340,7 +346,10 @@ mod tests {
             ("\"range\": 1.5", "joints[0] (door): range: the number 1.5 is given, a list of 2 values is wanted"),
             ("\"range\": [0, 1, 2]", "joints[0] (door): range: a list of 3 is given, a list of 2 values is wanted"),
             ("\"axis\": [0, \"1\", 2]", "joints[0] (door): axis[1]: the text \"1\" is given, a number is wanted"),
-            ("\"boxes\": [3]", "joints[0] (door): boxes[0]: the number 3 is given, an object {...} is wanted"),
+            (
+                "\"boxes\": [3]",
+                "joints[0] (door): boxes[0]: the number 3 is given, an object with \"center\", \"half\", \"R\" is wanted",
+            ),
             ("\"colour\": 1", "joints[0] (door): the key \"colour\" is not known here; known are \"id\", "),
         ] {
             let said = said::<JointsFile>(&joint(inside));
@@ -355,7 +364,7 @@ mod tests {
         let row = "{\"recording\": \"r\", \"clip\": \"c\", \"type\": null}";
         assert_eq!(
             said::<Predictions>(&format!("[{row}]")),
-            "the whole file: a list of 1 is given, an object {...} is wanted"
+            "the whole file: a list of 1 is given, an object with \"predictions\" is wanted"
         );
         assert_eq!(
             said::<Predictions>("{\"predictions\": [{\"recording\": \"r\", \"clip\": \"c\", \"type\": \"door\"}]}"),
