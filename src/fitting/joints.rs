@@ -5,10 +5,11 @@ use std::collections::BTreeSet;
 use nalgebra::{Matrix3, UnitQuaternion};
 use serde::Deserialize;
 
-use super::{Plan, bounds_of, limits, overlap, place};
+use super::{Plan, bounds_of, limits, overlap, placing::place};
 use crate::articulation::{Articulation, JointKind};
 use crate::config;
 use crate::error::{Error, Result};
+use crate::export::check_piece;
 use crate::geometry::Face;
 use crate::geometry::Rect;
 use crate::math::{Point, Vector, reject, unit};
@@ -139,11 +140,12 @@ pub fn from_joints(file: &JointsFile, config: &config::Fitting) -> Result<Twin> 
         };
         let config = config::Fitting { carcass_depth_m: found.depth, ..config.clone() };
         let built = place(&plan, &placed, &config)
-            .ok_or("its front shares space with furniture before it in the list")
-            .and_then(|piece| finished(piece, found, &placed, config.density_kg_per_m3));
+            .map_err(|why| why.told("its front shares space with furniture before it in the list"))
+            .and_then(|piece| finished(piece, found, &placed, config.density_kg_per_m3).map_err(str::to_owned))
+            .and_then(|piece| check_piece(&piece).map(|()| piece));
         match built {
             Ok(piece) => placed.push((i, piece)),
-            Err(reason) => left_out.push(LeftOut { id: found.joint.id.clone(), reason: reason.to_owned() }),
+            Err(reason) => left_out.push(LeftOut { id: found.joint.id.clone(), reason }),
         }
     }
     Ok(Twin {
