@@ -8,7 +8,7 @@ use clap::Args;
 use super::output::write_file;
 use super::progress::Steps;
 use super::words::{self as model, Asked, WordsArgs};
-use super::{Answer, ConfigFile, print, shown};
+use super::{Answer, ConfigFile, Opening, print, shown};
 use crate::articulation::Outcome;
 use crate::config::Config;
 use crate::evaluation::Predictions;
@@ -32,6 +32,8 @@ pub struct InferArgs {
     /// parameters switch validation.feedback off)
     #[arg(long)]
     physics: bool,
+    #[command(flatten)]
+    opening: Opening,
     #[command(flatten)]
     config: ConfigFile,
     #[command(flatten)]
@@ -57,12 +59,13 @@ pub fn run(args: &InferArgs) -> anyhow::Result<Answer> {
     if folders.is_empty() {
         bare_trajectories(&trajectories, &config, args.out.as_deref())
     } else {
-        recordings(&folders, &config, args.words.open()?.as_ref(), args.out.as_deref())
+        recordings(&folders, args.opening, &config, args.words.open()?.as_ref(), args.out.as_deref())
     }
 }
 
 fn recordings(
     folders: &[&PathBuf],
+    opening: Opening,
     config: &Config,
     asked: Option<&Asked>,
     out: Option<&Path>,
@@ -71,7 +74,7 @@ fn recordings(
     let header = ["recording", "clip", "narration", "joint", "outcome"];
     let mut rows = vec![header.map(str::to_owned).to_vec()];
     // All are opened before the first is worked on: one that cannot be read is told at once.
-    let opened: Vec<Recording> = folders.iter().map(|f| Recording::open(f)).collect::<Result<_, _>>()?;
+    let opened: Vec<Recording> = folders.iter().map(|f| opening.open(f)).collect::<Result<_, _>>()?;
     if let Some(asked) = asked.filter(|a| a.is_dry()) {
         return asked.count(&opened, config);
     }
