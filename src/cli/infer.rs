@@ -99,11 +99,12 @@ fn recordings(
         write_file(out, json::text(&all)?)?;
         eprintln!("predictions: {}", shown(out));
     }
+    let damaged = total.as_ref().is_some_and(|u| !u.damaged.is_empty());
     if let Some((asked, usage)) = asked.zip(total) {
         eprintln!("{}", usage.sentence(asked.model()));
     }
     let found = all.predictions.iter().any(|p| p.kind.is_some());
-    Ok(if found { Answer::Yes } else { Answer::No })
+    Ok(if found && !damaged { Answer::Yes } else { Answer::No })
 }
 
 /// What is predicted for a recording.

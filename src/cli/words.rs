@@ -258,6 +258,10 @@ pub fn infer(
 
 /// The usage after one more recording: the model counts over all of them, stored answers are counted by recording.
 pub fn added(total: Option<Usage>, usage: Option<Usage>) -> Option<Usage> {
-    let before = total.map_or(0, |t| t.from_store);
-    usage.map(|u| Usage { from_store: before + u.from_store, ..u })
+    let (before, damaged) = total.map_or_else(Default::default, |t| (t.from_store, t.damaged));
+    usage.map(|mut u| {
+        u.from_store += before;
+        u.damaged.extend(damaged);
+        u
+    })
 }
