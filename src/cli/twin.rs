@@ -195,7 +195,7 @@ pub fn make(
 
 /// The replay of all joints, and what had to be left out of it: a hand that cannot be replayed costs its clip, a joint that
 /// cannot be simulated its hands.
-fn replayed(
+pub fn replayed(
     twin: &Twin,
     hands: &[JointHands],
     up: &Vector,
