@@ -167,7 +167,8 @@ fn links_that_leave_a_recording_need_the_flag() {
         symlink("metric", r.join("depth")).unwrap();
         symlink("rec", r.join("../link")).unwrap();
     });
-    assert!(Recording::open(&dir.path().join("link")).unwrap().has_depth(0));
+    let read = Recording::open(&dir.path().join("link")).unwrap();
+    assert!((0..read.frames.len()).any(|frame| read.has_depth(frame)));
 }
 
 #[test]
