@@ -79,8 +79,10 @@ fn recordings(
         return asked.count(&opened, config);
     }
     let mut total: Option<Usage> = None;
+    let mut whole = true;
     for recording in &opened {
-        let Predicted { scene, predictions, usage } = predict(recording, config, asked)?;
+        let Predicted { scene, predictions, usage, is_whole } = predict(recording, config, asked)?;
+        whole &= is_whole;
         total = model::added(total, usage);
         for c in &scene.clips {
             let joint = scene.joint_of(&c.clip.clip);
@@ -99,12 +101,12 @@ fn recordings(
         write_file(out, json::text(&all)?)?;
         eprintln!("predictions: {}", shown(out));
     }
-    let damaged = total.as_ref().is_some_and(|u| !u.damaged.is_empty());
+    whole &= total.as_ref().is_none_or(|u| u.damaged.is_empty());
     if let Some((asked, usage)) = asked.zip(total) {
         eprintln!("{}", usage.sentence(asked.model()));
     }
     let found = all.predictions.iter().any(|p| p.kind.is_some());
-    Ok(if found && !damaged { Answer::Yes } else { Answer::No })
+    Ok(if found && whole { Answer::Yes } else { Answer::No })
 }
 
 /// What is predicted for a recording.
@@ -115,17 +117,19 @@ pub struct Predicted {
     pub predictions: Predictions,
     /// What a model was asked so far, where one is.
     pub usage: Option<Usage>,
+    /// Whether every file of its frames could be read.
+    pub is_whole: bool,
 }
 
 /// Inference, what physics says to it where the configuration asks, and fit of one recording.
 pub fn predict(recording: &Recording, config: &Config, asked: Option<&Asked>) -> anyhow::Result<Predicted> {
     let steps = Steps::new();
-    let model::Inferred { mut scene, usage, .. } = model::infer(recording, config, asked, &steps, false)?;
+    let model::Inferred { mut scene, usage, lost, .. } = model::infer(recording, config, asked, &steps, false)?;
     weigh(&mut scene, recording, config, &steps);
     let twin = crate::fitting::fit(&scene, &recording.up(), &config.fitting);
     steps.finish();
     let predictions = files::predictions(&scene, &twin);
-    Ok(Predicted { scene, predictions, usage })
+    Ok(Predicted { scene, predictions, usage, is_whole: lost.is_empty() })
 }
 
 /// What physics says to a scene's joints, where the configuration asks for it.

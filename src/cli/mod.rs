@@ -42,7 +42,7 @@ pub enum Answer {
     version,
     about = "From an egocentric recording of opened doors and drawers to a kitchen that simulates",
     after_help = "Start with `paws demo`. A recording is a folder (docs/recording-format.md); \
-                  exit codes: 0 done, 1 ran but the answer is no, 2 error."
+                  exit codes: 0 done, 1 ran but the answer is no or not whole, 2 error."
 )]
 struct Cli {
     #[command(subcommand)]

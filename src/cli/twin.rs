@@ -132,7 +132,7 @@ pub fn make(
     let output = Output::new(out, Kind::Twin, &[given.recording])?;
     let recording = given.opening.open(given.recording)?;
     let steps = Steps::new();
-    let model::Inferred { mut scene, reasoner, usage, exchanges } =
+    let model::Inferred { mut scene, reasoner, usage, exchanges, lost: unread } =
         model::infer(&recording, config, asked, &steps, keep_steps)?;
     super::infer::weigh(&mut scene, &recording, config, &steps);
     steps.report("fitting boxes", 0, 1);
@@ -189,7 +189,7 @@ pub fn make(
         shown(&out.join("scene.usda"))
     ))?;
     let refuted = validation.joints.iter().any(|j| j.verdict == Verdict::Fail);
-    let whole = lost.is_empty() && !damaged;
+    let whole = lost.is_empty() && unread.is_empty() && twin.left_out.is_empty() && !damaged;
     Ok(if refuted || twin.furniture.is_empty() || !whole { Answer::No } else { Answer::Yes })
 }
 

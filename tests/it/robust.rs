@@ -256,6 +256,24 @@ fn a_clip_that_cannot_be_replayed_costs_itself() {
 }
 
 #[test]
+fn an_image_that_cannot_be_read_costs_its_frame() {
+    let dir = recording(|r| {
+        let mut depth: Vec<_> = std::fs::read_dir(r.join("depth")).unwrap().map(|e| e.unwrap().path()).collect();
+        depth.sort();
+        // Of the middle, and of the views before anything is touched.
+        for path in [&depth[1], &depth[depth.len() / 2]] {
+            let bytes = std::fs::read(path).unwrap();
+            std::fs::write(path, &bytes[..bytes.len() / 2]).unwrap();
+        }
+    });
+    let out = paws(&["infer", "rec", "--out", "p.json"], dir.path());
+    assert!(matches!(out.status.code(), Some(0 | 1)), "{}", stderr(&out));
+    // Frames that nobody looks at cost nothing.
+    assert_eq!(out.status.code() == Some(1), stderr(&out).contains("left out: "), "{}", stderr(&out));
+    assert!(dir.path().join("p.json").exists());
+}
+
+#[test]
 fn clips_with_long_and_with_like_names_have_folders_of_their_own() {
     let dir = recording(|r| {
         edit(&r.join("clips.json"), |v| {
