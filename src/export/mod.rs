@@ -12,7 +12,7 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
 use crate::error::{Error, Result};
 use crate::math::{Point, Pose, Vector, eigen_descending};
-use crate::twin::{Furniture, OrientedBox, Role, Solid, Twin};
+use crate::twin::{OrientedBox, Role, Solid, Twin};
 
 /// Every role, in the order of the materials.
 pub(crate) const ROLES: [Role; 5] = [Role::Front, Role::Handle, Role::Tray, Role::Carcass, Role::Room];
@@ -107,72 +107,20 @@ pub fn check(twin: &Twin) -> Result<()> {
             take(s.name.clone())?;
             take(format!("{}_visual", s.name))?;
         }
-        check_piece(f).map_err(Error::Export)?;
+        f.check().map_err(Error::Export)?;
     }
     for s in &twin.room {
         take(s.name.clone())?;
         take(format!("{}_visual", s.name))?;
-        check_box(s).map_err(Error::Export)?;
+        s.check().map_err(Error::Export)?;
     }
     Ok(())
 }
-
-/// The same of one piece of furniture, its names apart.
-///
-/// # Errors
-/// What is wrong with it, in words.
-pub(crate) fn check_piece(f: &Furniture) -> std::result::Result<(), String> {
-    let id = &f.part.id;
-    f.carcass.iter().chain(&f.part.solids).try_for_each(check_box)?;
-    if f.part.solids.is_empty() || f.carcass.is_empty() {
-        return Err(format!("{id}: a part and its base need at least one box each"));
-    }
-    let joint = &f.part.joint;
-    let unit = (joint.articulation.axis.norm() - 1.0).abs() < 1e-6;
-    // A turn, or the length of a room.
-    let most = match joint.articulation.kind {
-        crate::articulation::JointKind::Revolute => std::f64::consts::TAU,
-        crate::articulation::JointKind::Prismatic => 10.0,
-    };
-    let opens = joint.upper > 0.0 && joint.upper <= most;
-    let resists = [joint.damping, joint.friction].iter().all(|x| x.is_finite() && *x >= 0.0);
-    if !(unit && opens && resists && near(&joint.articulation.origin, FAR_M) && near(&f.part.handle, FAR_M)) {
-        return Err(format!(
-            "{id}: the axis must be a unit vector, the upper limit positive and at most {most:.2}, damping and friction \
-             not negative, origin and handle within {FAR_M} m"
-        ));
-    }
-    if !([joint.observed, joint.expected].iter().all(|x| x.is_finite()) && is_rotation(&f.part.bounds.rotation)) {
-        return Err(format!("{id}: observed and expected opening must be finite, the axes of its bounds a rotation"));
-    }
-    Ok(())
-}
-
-/// A home is smaller, and single precision still tells millimetres there.
-const FAR_M: f64 = 1e3;
 
 /// Whether a name is one in all formats: USD's are identifiers.
 fn is_name(name: &str) -> bool {
     name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
         && name.chars().next().is_some_and(|c| !c.is_ascii_digit())
-}
-
-/// What is wrong with a box, in words.
-pub(crate) fn check_box(s: &Solid) -> std::result::Result<(), String> {
-    let b = &s.shape;
-    let sizes = b.half.iter().all(|h| *h > 0.0 && *h < FAR_M);
-    if sizes && is_rotation(&b.rotation) && near(&b.center, FAR_M) {
-        return Ok(());
-    }
-    Err(format!("box {}: sizes must be positive, axes right-handed and orthonormal, all within {FAR_M} m", s.name))
-}
-
-fn is_rotation(m: &Matrix3<f64>) -> bool {
-    (m.transpose() * m - Matrix3::identity()).norm() < 1e-6 && m.determinant() > 0.0
-}
-
-fn near(p: &Point, limit: f64) -> bool {
-    p.coords.iter().all(|c| c.abs() < limit)
 }
 
 #[cfg(test)]

@@ -9,7 +9,6 @@ use super::{Plan, bounds_of, limits, overlap, placing::place};
 use crate::articulation::{Articulation, JointKind};
 use crate::config;
 use crate::error::{Error, Result};
-use crate::export::check_piece;
 use crate::geometry::Face;
 use crate::geometry::Rect;
 use crate::math::{Point, Vector, reject, unit};
@@ -142,7 +141,7 @@ pub fn from_joints(file: &JointsFile, config: &config::Fitting) -> Result<Twin> 
         let built = place(&plan, &placed, &config)
             .map_err(|why| why.told("its front shares space with furniture before it in the list"))
             .and_then(|piece| finished(piece, found, &placed, config.density_kg_per_m3).map_err(str::to_owned))
-            .and_then(|piece| check_piece(&piece).map(|()| piece));
+            .and_then(|piece| piece.check().map(|()| piece));
         match built {
             Ok(piece) => placed.push((i, piece)),
             Err(reason) => left_out.push(LeftOut { id: found.joint.id.clone(), reason }),

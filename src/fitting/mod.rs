@@ -13,7 +13,6 @@ use nalgebra::Matrix3;
 
 use crate::articulation::{Articulation, JointKind};
 use crate::config;
-use crate::export::{check_box, check_piece};
 use crate::geometry::Face;
 use crate::geometry::Rect;
 use crate::hands::Trajectory;
@@ -99,13 +98,13 @@ pub fn fit_joints(scene: &Scene, joints: &[SceneJoint], up: &Vector, config: &co
     }
     let surroundings = scene.surroundings.as_ref().filter(|_| config.room);
     let mut room = surroundings.map_or_else(Vec::new, |cells| room::boxes(cells, &furniture, config));
-    room.retain(|solid| check_box(solid).is_ok());
+    room.retain(|solid| solid.check().is_ok());
     limits::beyond_observed(&mut furniture, &room);
     for (piece, joint) in furniture.iter_mut().zip(joints) {
         resist(&mut piece.part, &hands(scene, joint), up, config);
     }
     // Whatever a step made of a piece: one that no simulator would load costs itself.
-    furniture.retain(|piece| match check_piece(piece) {
+    furniture.retain(|piece| match piece.check() {
         Ok(()) => true,
         Err(reason) => {
             left_out.push(LeftOut { id: piece.part.id.clone(), reason });
@@ -524,7 +523,7 @@ mod tests {
         again.id = "joint_1".to_owned();
         let twin = twin(vec![scene_joint(JointKind::Revolute), again]);
         assert_eq!((twin.furniture.len(), twin.left_out.len()), (1, 1), "{:?}", twin.left_out);
-        crate::export::check(&twin).unwrap();
+        twin.furniture[0].check().unwrap();
     }
 
     #[test]

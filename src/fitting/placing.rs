@@ -3,7 +3,6 @@
 use super::{Plan, build, overlap};
 use crate::articulation::JointKind;
 use crate::config;
-use crate::export::check_piece;
 use crate::geometry::Rect;
 use crate::twin::{Furniture, Role, Solid};
 
@@ -39,7 +38,7 @@ pub(super) fn place(
     }
     // Only what can be built is asked for its space; one that could be, tells that space is what lacks.
     let mut unplaced = None;
-    let mut stands = |f: &Furniture| match check_piece(f) {
+    let mut stands = |f: &Furniture| match f.check() {
         Ok(()) if placed.iter().any(|(_, other)| overlap::furniture(other, f)) => {
             unplaced = Some(Unplaced::NoSpace);
             false

@@ -326,52 +326,90 @@ fn wanted(expected: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::evaluation::Predictions;
-    use crate::fitting::joints::JointsFile;
+    use serde::Deserialize;
 
-    fn said<T: DeserializeOwned>(text: &str) -> String {
-        let (place, message) = explain::<T>(&serde_json::from_str(text).unwrap()).unwrap();
+    use super::*;
+
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    #[allow(dead_code, reason = "read to see what is said about it")]
+    struct File {
+        scene: String,
+        #[serde(default)]
+        up: Option<[f64; 3]>,
+        joints: Vec<Entry>,
+    }
+
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    #[allow(dead_code, reason = "read to see what is said about it")]
+    struct Entry {
+        id: String,
+        #[serde(rename = "type")]
+        kind: Option<Kind>,
+        axis: Option<nalgebra::Vector3<f64>>,
+        range: Option<[f64; 2]>,
+        shape: Option<Shape>,
+        #[serde(default)]
+        boxes: Vec<Shape>,
+    }
+
+    #[derive(Deserialize)]
+    #[serde(rename_all = "lowercase")]
+    enum Kind {
+        Revolute,
+        Prismatic,
+    }
+
+    #[derive(Deserialize)]
+    #[allow(dead_code, reason = "read to see what is said about it")]
+    struct Shape {
+        center: [f64; 3],
+        half: [f64; 3],
+    }
+
+    fn said(text: &str) -> String {
+        let (place, message) = explain::<File>(&serde_json::from_str(text).unwrap()).unwrap();
         format!("{place}: {message}")
     }
 
     #[test]
     fn a_fault_has_its_place_its_name_and_words_for_people() {
-        let joint = |inside: &str| format!("{{\"scene\": \"s\", \"joints\": [{{\"id\": \"door\", {inside}}}]}}");
         for (inside, wanted) in [
+            ("\"shape\": {\"center\": [0,0,0]}", "joints[0] (door): shape: the key \"half\" is missing"),
             (
-                "\"part_box\": {\"center\": [0,0,0], \"half\": [1,1,1]}",
-                "joints[0] (door): part_box: the key \"R\" is missing",
+                "\"shape\": [0,0,0,1,1,1]",
+                "joints[0] (door): shape: a list of 6 is given, an object with \"center\", \"half\" is wanted",
             ),
             ("\"range\": 1.5", "joints[0] (door): range: the number 1.5 is given, a list of 2 values is wanted"),
             ("\"range\": [0, 1, 2]", "joints[0] (door): range: a list of 3 is given, a list of 2 values is wanted"),
+            ("\"range\": [0]", "joints[0] (door): range: a list of 1 is given, a list of 2 values is wanted"),
             ("\"axis\": [0, \"1\", 2]", "joints[0] (door): axis[1]: the text \"1\" is given, a number is wanted"),
+            ("\"axis\": \"Z\"", "joints[0] (door): axis: the text \"Z\" is given, a list of numbers"),
             (
                 "\"boxes\": [3]",
-                "joints[0] (door): boxes[0]: the number 3 is given, an object with \"center\", \"half\", \"R\" is wanted",
+                "joints[0] (door): boxes[0]: the number 3 is given, an object with \"center\", \"half\" is wanted",
             ),
-            ("\"colour\": 1", "joints[0] (door): the key \"colour\" is not known here; known are \"id\", "),
+            (
+                "\"type\": \"hinge\"",
+                "joints[0] (door): type: the text \"hinge\" is given, \"revolute\" or \"prismatic\" is wanted",
+            ),
+            ("\"type\": 1", "joints[0] (door): type: the number 1 is given, a text in quotes is wanted"),
+            ("\"colour\": 1", "joints[0] (door): the key \"colour\" is not known here; known are \"id\", \"type\", "),
         ] {
-            let said = said::<JointsFile>(&joint(inside));
+            let said = said(&format!("{{\"scene\": \"s\", \"joints\": [{{\"id\": \"door\", {inside}}}]}}"));
             assert!(said.starts_with(wanted), "{said}, not {wanted}");
         }
-        let up = said::<JointsFile>("{\"scene\": \"s\", \"up\": \"Y\", \"joints\": []}");
-        assert!(up.starts_with("up: the text \"Y\" is given, a list of numbers"), "{up}");
+        assert!(said("{\"scene\": \"s\", \"joints\": [{}]}").starts_with("joints[0]: the key \"id\" is missing"));
     }
 
     #[test]
     fn a_list_in_the_place_of_an_object_is_not_read_in_order() {
-        let row = "{\"recording\": \"r\", \"clip\": \"c\", \"type\": null}";
-        assert_eq!(
-            said::<Predictions>(&format!("[{row}]")),
-            "the whole file: a list of 1 is given, an object with \"predictions\" is wanted"
-        );
-        assert_eq!(
-            said::<Predictions>("{\"predictions\": [{\"recording\": \"r\", \"clip\": \"c\", \"type\": \"door\"}]}"),
-            "predictions[0] (r/c): type: the text \"door\" is given, \"revolute\" or \"prismatic\" is wanted"
-        );
-        assert!(
-            explain::<Predictions>(&serde_json::from_str(&format!("{{\"predictions\": [{row}]}}")).unwrap()).is_none()
-        );
+        let wanted = "the whole file: a list of 2 is given, an object with \"scene\", \"up\", \"joints\" is wanted";
+        assert_eq!(said("[\"s\", []]"), wanted);
+        let good =
+            serde_json::from_str("{\"scene\": \"s\", \"joints\": [{\"id\": \"a\", \"range\": [0, 1]}]}").unwrap();
+        assert!(explain::<File>(&good).is_none());
+        assert!(explain::<Kind>(&Value::from("revolute")).is_none());
     }
 }
