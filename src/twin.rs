@@ -259,6 +259,71 @@ pub fn mass_properties(solids: &[Solid], density: f64) -> Option<MassProperties>
     Some(MassProperties { mass, center: Point::from(center), inertia: (inertia + inertia.transpose()) * 0.5 })
 }
 
+/// A home is smaller, and single precision still tells millimetres there.
+const FAR_M: f64 = 1e3;
+
+fn is_rotation(m: &Matrix3<f64>) -> bool {
+    (m.transpose() * m - Matrix3::identity()).norm() < 1e-6 && m.determinant() > 0.0
+}
+
+fn is_near(p: &Point) -> bool {
+    p.coords.iter().all(|c| c.abs() < FAR_M)
+}
+
+impl Solid {
+    /// Whether a simulator can load it.
+    ///
+    /// # Errors
+    /// What is wrong with it, in words.
+    pub fn check(&self) -> Result<(), String> {
+        let b = &self.shape;
+        let sizes = b.half.iter().all(|h| *h > 0.0 && *h < FAR_M);
+        if sizes && is_rotation(&b.rotation) && is_near(&b.center) {
+            return Ok(());
+        }
+        Err(format!(
+            "box {}: sizes must be positive, axes right-handed and orthonormal, all within {FAR_M} m",
+            self.name
+        ))
+    }
+}
+
+impl Furniture {
+    /// Whether a simulator can load it, names apart.
+    ///
+    /// # Errors
+    /// What is wrong with it, in words.
+    pub fn check(&self) -> Result<(), String> {
+        let id = &self.part.id;
+        self.carcass.iter().chain(&self.part.solids).try_for_each(Solid::check)?;
+        if self.part.solids.is_empty() || self.carcass.is_empty() {
+            return Err(format!("{id}: a part and its base need at least one box each"));
+        }
+        let joint = &self.part.joint;
+        let unit = (joint.articulation.axis.norm() - 1.0).abs() < 1e-6;
+        // A turn, or the length of a room.
+        let most = match joint.articulation.kind {
+            JointKind::Revolute => std::f64::consts::TAU,
+            JointKind::Prismatic => 10.0,
+        };
+        let opens = joint.upper > 0.0 && joint.upper <= most;
+        let resists = [joint.damping, joint.friction].iter().all(|x| x.is_finite() && *x >= 0.0);
+        if !(unit && opens && resists && is_near(&joint.articulation.origin) && is_near(&self.part.handle)) {
+            return Err(format!(
+                "{id}: the axis must be a unit vector, the upper limit positive and at most {most:.2}, damping and friction \
+                 not negative, origin and handle within {FAR_M} m"
+            ));
+        }
+        let openings = [joint.observed, joint.expected].iter().all(|x| x.is_finite());
+        if !(openings && is_rotation(&self.part.bounds.rotation)) {
+            return Err(format!(
+                "{id}: observed and expected opening must be finite, the axes of its bounds a rotation"
+            ));
+        }
+        Ok(())
+    }
+}
+
 impl Part {
     /// Whether its weight (boxes of `density`, kg/m^3) overcomes its friction when it is closed and no spring carries it.
     #[must_use]

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::infer::predict;
 use super::output::write_file;
 use super::words::{self as model, Asked, WordsArgs};
-use super::{Answer, evaluate as truth, print, shown};
+use super::{Answer, Opening, evaluate as truth, print, shown};
 use crate::config::Config;
 use crate::evaluation::{Paired, Predictions, Report, Rule, compare, evaluate};
 use crate::json;
@@ -57,6 +57,8 @@ pub struct AblateArgs {
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     #[command(flatten)]
+    opening: Opening,
+    #[command(flatten)]
     words: WordsArgs,
 }
 
@@ -77,7 +79,7 @@ pub fn run(args: &AblateArgs) -> anyhow::Result<Answer> {
         bail!("--dry-run counts for one configuration: use it with `paws infer --config FILE`");
     }
     // All are opened before the first is worked on; what the inference sees of them holds no truth.
-    let opened: Vec<Recording> = args.recordings.iter().map(|f| Recording::open(f)).collect::<Result<_, _>>()?;
+    let opened: Vec<Recording> = args.recordings.iter().map(|f| args.opening.open(f)).collect::<Result<_, _>>()?;
     let truths = truth::truths(&args.recordings)?;
     if truths.iter().all(|t| t.clips.values().all(Option::is_none)) {
         bail!("no clip of these recordings moves a joint: there is nothing to compare");

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Answer, twin};
+use super::{Answer, Opening, twin};
 use crate::config::Config;
 
 #[derive(Debug, Args)]
@@ -22,5 +22,6 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Answer> {
     eprintln!("rendering a recording of a kitchen into {} ...", recording.display());
     super::synth::write(&crate::synth::Options { seed: SEED, width: 480, parts: 6, ..Default::default() }, &recording)?;
     eprintln!("making its twin ...");
-    twin::make(&recording, &twin, &Config::default(), true, None)
+    let given = twin::Given { recording: &recording, opening: Opening::default() };
+    twin::make(given, &twin, &Config::default(), true, None)
 }

@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use rayon::prelude::*;
 
-use super::output::write_file;
+use super::output::{restore, write_file};
 use super::{Answer, print, shown};
 use crate::config::Config;
 use crate::fitting::joints::{self, JointsFile};
@@ -43,6 +43,7 @@ pub struct ExportArgs {
 
 /// Reads a twin from its file or folder.
 pub fn read_twin(path: &Path) -> anyhow::Result<Twin> {
+    restore(path);
     let file = if path.is_dir() { path.join("twin.json") } else { path.to_owned() };
     if path.is_dir() && !file.exists() {
         bail!("{}: no such file; a folder that `paws twin` wrote has one", shown(&file));
@@ -67,6 +68,11 @@ fn kind_of(path: &Path) -> anyhow::Result<Given> {
     match (value.get("furniture").is_some(), value.get("joints").is_some()) {
         (true, _) => Ok(Given::Twin),
         (false, true) => Ok(Given::Joints),
+        (false, false) if value.is_array() => bail!(
+            "{}: is a list; an object is wanted, with \"furniture\" (a twin) or with \"scene\" and \"joints\" \
+             (docs/joints-format.md)",
+            shown(path)
+        ),
         (false, false) => bail!(
             "{}: neither a twin (it has no \"furniture\") nor joints (it has no \"joints\"; see docs/joints-format.md)",
             shown(path)

@@ -8,7 +8,7 @@ use clap::Args;
 use super::output::write_file;
 use super::progress::Steps;
 use super::words::{self as model, Asked, WordsArgs};
-use super::{Answer, ConfigFile, print, shown};
+use super::{Answer, ConfigFile, Opening, print, shown};
 use crate::articulation::Outcome;
 use crate::config::Config;
 use crate::evaluation::Predictions;
@@ -32,6 +32,8 @@ pub struct InferArgs {
     /// parameters switch validation.feedback off)
     #[arg(long)]
     physics: bool,
+    #[command(flatten)]
+    opening: Opening,
     #[command(flatten)]
     config: ConfigFile,
     #[command(flatten)]
@@ -57,12 +59,13 @@ pub fn run(args: &InferArgs) -> anyhow::Result<Answer> {
     if folders.is_empty() {
         bare_trajectories(&trajectories, &config, args.out.as_deref())
     } else {
-        recordings(&folders, &config, args.words.open()?.as_ref(), args.out.as_deref())
+        recordings(&folders, args.opening, &config, args.words.open()?.as_ref(), args.out.as_deref())
     }
 }
 
 fn recordings(
     folders: &[&PathBuf],
+    opening: Opening,
     config: &Config,
     asked: Option<&Asked>,
     out: Option<&Path>,
@@ -71,13 +74,15 @@ fn recordings(
     let header = ["recording", "clip", "narration", "joint", "outcome"];
     let mut rows = vec![header.map(str::to_owned).to_vec()];
     // All are opened before the first is worked on: one that cannot be read is told at once.
-    let opened: Vec<Recording> = folders.iter().map(|f| Recording::open(f)).collect::<Result<_, _>>()?;
+    let opened: Vec<Recording> = folders.iter().map(|f| opening.open(f)).collect::<Result<_, _>>()?;
     if let Some(asked) = asked.filter(|a| a.is_dry()) {
         return asked.count(&opened, config);
     }
     let mut total: Option<Usage> = None;
+    let mut whole = true;
     for recording in &opened {
-        let Predicted { scene, predictions, usage } = predict(recording, config, asked)?;
+        let Predicted { scene, predictions, usage, is_whole } = predict(recording, config, asked)?;
+        whole &= is_whole;
         total = model::added(total, usage);
         for c in &scene.clips {
             let joint = scene.joint_of(&c.clip.clip);
@@ -96,11 +101,12 @@ fn recordings(
         write_file(out, json::text(&all)?)?;
         eprintln!("predictions: {}", shown(out));
     }
+    whole &= total.as_ref().is_none_or(|u| u.damaged.is_empty());
     if let Some((asked, usage)) = asked.zip(total) {
         eprintln!("{}", usage.sentence(asked.model()));
     }
     let found = all.predictions.iter().any(|p| p.kind.is_some());
-    Ok(if found { Answer::Yes } else { Answer::No })
+    Ok(if found && whole { Answer::Yes } else { Answer::No })
 }
 
 /// What is predicted for a recording.
@@ -111,17 +117,19 @@ pub struct Predicted {
     pub predictions: Predictions,
     /// What a model was asked so far, where one is.
     pub usage: Option<Usage>,
+    /// Whether every file of its frames could be read.
+    pub is_whole: bool,
 }
 
 /// Inference, what physics says to it where the configuration asks, and fit of one recording.
 pub fn predict(recording: &Recording, config: &Config, asked: Option<&Asked>) -> anyhow::Result<Predicted> {
     let steps = Steps::new();
-    let model::Inferred { mut scene, usage, .. } = model::infer(recording, config, asked, &steps, false)?;
+    let model::Inferred { mut scene, usage, lost, .. } = model::infer(recording, config, asked, &steps, false)?;
     weigh(&mut scene, recording, config, &steps);
     let twin = crate::fitting::fit(&scene, &recording.up(), &config.fitting);
     steps.finish();
     let predictions = files::predictions(&scene, &twin);
-    Ok(Predicted { scene, predictions, usage })
+    Ok(Predicted { scene, predictions, usage, is_whole: lost.is_empty() })
 }
 
 /// What physics says to a scene's joints, where the configuration asks for it.

@@ -1,5 +1,6 @@
 //! `--keep`: every intermediate result, to look at.
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use anyhow::Context;
@@ -13,69 +14,100 @@ use crate::pipeline::{ClipResult, Scene};
 use crate::recording::{Camera, Recording};
 use crate::twin::Twin;
 
+/// Writes every clip's steps; what could not be written of one, with the reason, costs the others nothing.
 pub fn write(
     recording: &Recording,
     scene: &Scene,
     twin: &Twin,
     exchanges: &[Exchange],
     output: &Output,
-) -> anyhow::Result<()> {
-    for clip in &scene.clips {
-        // A clip's name may be anything; a folder's may not.
-        let name: String = clip
-            .clip
-            .clip
+) -> Vec<String> {
+    let names: Vec<&str> = scene.clips.iter().map(|c| c.clip.clip.as_str()).collect();
+    let mut lost = Vec::new();
+    for (clip, folder) in scene.clips.iter().zip(folders(&names)) {
+        let folder = format!("steps/{folder}");
+        if let Err(error) = write_clip(recording, scene, clip, twin, exchanges, output, &folder) {
+            lost.push(format!("steps of clip {}: {error:#}", clip.clip.clip));
+        }
+    }
+    lost
+}
+
+/// A folder for each clip: a clip's name may be anything and as long as it likes, a folder's may not, and two clips have two
+/// folders also where a file system takes capitals for small letters.
+fn folders(names: &[&str]) -> Vec<String> {
+    // File systems take 255 bytes; four a letter, a number behind it.
+    const MOST: usize = 60;
+    let mut taken = BTreeSet::new();
+    let mut all = Vec::with_capacity(names.len());
+    for name in names {
+        let plain: String = name
             .chars()
+            .take(MOST)
             .map(|c| if c.is_alphanumeric() || matches!(c, '-' | '_' | '.') { c } else { '_' })
             .collect();
-        let folder = format!("steps/{}", if name.trim_matches('.').is_empty() { "clip" } else { &name });
-        output.write(&format!("{folder}/clip.json"), json::text(clip)?)?;
-        if let Some(trajectory) = &clip.trajectory {
-            let mut text = String::from("frame,time_secs,observed_x,observed_y,observed_z,x,y,z,accepted\n");
-            for s in &trajectory.samples {
-                let (o, p) = (s.observed, s.smoothed);
-                let accepted = u8::from(s.accepted);
-                writeln!(
-                    text,
-                    "{},{},{},{},{},{},{},{},{accepted}",
-                    s.frame, s.time_secs, o.x, o.y, o.z, p.x, p.y, p.z
-                )?;
-            }
-            output.write(&format!("{folder}/trajectory.csv"), text)?;
+        let plain = if plain.trim_matches('.').is_empty() { "clip".to_owned() } else { plain };
+        let mut folder = plain.clone();
+        let mut number = 1;
+        while !taken.insert(folder.to_lowercase()) {
+            number += 1;
+            folder = format!("{plain}_{number}");
         }
-        if let Some(region) = &clip.region {
-            let centers = region.centers();
-            let mut text = format!(
-                "ply\nformat ascii 1.0\ncomment confident voxels\nelement vertex {}\nproperty float x\nproperty float y\n\
-                 property float z\nend_header\n",
-                centers.len()
-            );
-            for c in centers {
-                writeln!(text, "{} {} {}", c.x as f32, c.y as f32, c.z as f32)?;
-            }
-            output.write(&format!("{folder}/region.ply"), text)?;
-        }
-        if !clip.lines.is_empty() {
-            let mut text = String::from("# 3D lines\n");
-            for (i, line) in clip.lines.iter().enumerate() {
-                for p in line.segment.ends() {
-                    writeln!(text, "v {} {} {}", p.x, p.y, p.z)?;
-                }
-                writeln!(text, "l {} {}", 2 * i + 1, 2 * i + 2)?;
-            }
-            output.write(&format!("{folder}/lines.obj"), text)?;
-        }
-        for exchange in exchanges.iter().filter(|e| e.clip() == clip.clip.clip) {
-            let name = format!("{folder}/vlm/{}", exchange.name());
-            let answer = exchange.answer.as_deref().unwrap_or("(none)");
-            output.write(&format!("{name}.txt"), format!("{}\n--- answer ---\n{answer}\n", exchange.question.text))?;
-            if let Some(picture) = exchange.question.pictures.first() {
-                output.write(&format!("{name}.jpg"), &picture.bytes)?;
-            }
-        }
-        marked_image(recording, scene, clip, twin, output, &folder)?;
+        all.push(folder);
     }
-    Ok(())
+    all
+}
+
+fn write_clip(
+    recording: &Recording,
+    scene: &Scene,
+    clip: &ClipResult,
+    twin: &Twin,
+    exchanges: &[Exchange],
+    output: &Output,
+    folder: &str,
+) -> anyhow::Result<()> {
+    output.write(&format!("{folder}/clip.json"), json::text(clip)?)?;
+    if let Some(trajectory) = &clip.trajectory {
+        let mut text = String::from("frame,time_secs,observed_x,observed_y,observed_z,x,y,z,accepted\n");
+        for s in &trajectory.samples {
+            let (o, p) = (s.observed, s.smoothed);
+            let accepted = u8::from(s.accepted);
+            writeln!(text, "{},{},{},{},{},{},{},{},{accepted}", s.frame, s.time_secs, o.x, o.y, o.z, p.x, p.y, p.z)?;
+        }
+        output.write(&format!("{folder}/trajectory.csv"), text)?;
+    }
+    if let Some(region) = &clip.region {
+        let centers = region.centers();
+        let mut text = format!(
+            "ply\nformat ascii 1.0\ncomment confident voxels\nelement vertex {}\nproperty float x\nproperty float y\n\
+             property float z\nend_header\n",
+            centers.len()
+        );
+        for c in centers {
+            writeln!(text, "{} {} {}", c.x as f32, c.y as f32, c.z as f32)?;
+        }
+        output.write(&format!("{folder}/region.ply"), text)?;
+    }
+    if !clip.lines.is_empty() {
+        let mut text = String::from("# 3D lines\n");
+        for (i, line) in clip.lines.iter().enumerate() {
+            for p in line.segment.ends() {
+                writeln!(text, "v {} {} {}", p.x, p.y, p.z)?;
+            }
+            writeln!(text, "l {} {}", 2 * i + 1, 2 * i + 2)?;
+        }
+        output.write(&format!("{folder}/lines.obj"), text)?;
+    }
+    for exchange in exchanges.iter().filter(|e| e.clip() == clip.clip.clip) {
+        let name = format!("{folder}/vlm/{}", exchange.name());
+        let answer = exchange.answer.as_deref().unwrap_or("(none)");
+        output.write(&format!("{name}.txt"), format!("{}\n--- answer ---\n{answer}\n", exchange.question.text))?;
+        if let Some(picture) = exchange.question.pictures.first() {
+            output.write(&format!("{name}.jpg"), &picture.bytes)?;
+        }
+    }
+    marked_image(recording, scene, clip, twin, output, folder)
 }
 
 const LINE: Rgb<u8> = Rgb([70, 140, 255]);
@@ -93,9 +125,11 @@ fn marked_image(
     folder: &str,
 ) -> anyhow::Result<()> {
     let Some(&frame) = clip.region.as_ref().and_then(|r| r.local_frames.first()) else { return Ok(()) };
-    let Some(file) = &recording.frames[frame].files.rgb else { return Ok(()) };
-    let mut image = image::open(file).with_context(|| file.display().to_string())?.into_rgb8();
-    let camera_from_world = recording.frames[frame].world_from_camera.inverse();
+    let (Some(seen), Some(grid)) = (recording.frames.get(frame), recording.rgb(frame)?) else { return Ok(()) };
+    let mut image = RgbImage::from_fn(grid.width as u32, grid.height as u32, |x, y| {
+        Rgb(grid.get(x as usize, y as usize).unwrap_or_default())
+    });
+    let camera_from_world = seen.world_from_camera.inverse();
     let mut draw = |a: &Point, b: &Point, color: Rgb<u8>, half: i64| {
         stroke(&mut image, &recording.camera, &(camera_from_world * a), &(camera_from_world * b), color, half);
     };
@@ -155,5 +189,19 @@ fn stroke(image: &mut RgbImage, camera: &Camera, a: &Point, b: &Point, color: Rg
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::folders;
+
+    #[test]
+    fn every_clip_has_a_folder_of_its_own() {
+        let long = "x".repeat(300);
+        let names = ["a/b", "a_b", "A_B", "..", "", &long, &long, "\u{1f6aa}", "öffnen"];
+        let made = folders(&names);
+        assert_eq!(made[..5], ["a_b", "a_b_2", "A_B_3", "clip", "clip_2"]);
+        assert!(made[5].len() < 255 && made[5] != made[6] && made[8] == "öffnen", "{made:?}");
     }
 }

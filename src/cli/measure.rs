@@ -6,14 +6,13 @@ use clap::Args;
 
 use super::output::write_file;
 use super::progress::Steps;
-use super::{Answer, ConfigFile, print};
+use super::{Answer, ConfigFile, Opening, print};
 use crate::evaluation::stages::{SceneTruth, Stages, measure, measure_segments};
 use crate::geometry::segments::Lsd;
 use crate::json;
 use crate::math::stats;
 use crate::pipeline;
 use crate::reasoning::heuristic::Geometric;
-use crate::recording::Recording;
 use crate::report::table::aligned;
 
 #[derive(Debug, Args)]
@@ -28,6 +27,8 @@ pub struct MeasureArgs {
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     #[command(flatten)]
+    opening: Opening,
+    #[command(flatten)]
     config: ConfigFile,
 }
 
@@ -35,7 +36,7 @@ pub fn run(args: &MeasureArgs) -> anyhow::Result<Answer> {
     let config = args.config.read()?;
     let mut opened = Vec::new();
     for dir in &args.recordings {
-        opened.push((Recording::open(dir)?, SceneTruth::read(dir)?));
+        opened.push((args.opening.open(dir)?, SceneTruth::read(dir)?));
     }
     let mut rows = vec![HEADER.map(str::to_owned).to_vec()];
     let mut all: Vec<Stages> = Vec::new();

@@ -25,6 +25,7 @@ use std::process::ExitCode;
 use clap::{Args, Parser, Subcommand};
 
 use crate::config::Config;
+use crate::recording::Recording;
 
 /// What a command answers, as an exit code: 0 done, 1 ran but the answer is no, 2 error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,7 +42,7 @@ pub enum Answer {
     version,
     about = "From an egocentric recording of opened doors and drawers to a kitchen that simulates",
     after_help = "Start with `paws demo`. A recording is a folder (docs/recording-format.md); \
-                  exit codes: 0 done, 1 ran but the answer is no, 2 error."
+                  exit codes: 0 done, 1 ran but the answer is no or not whole, 2 error."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -89,6 +90,29 @@ impl ConfigFile {
             Some(word) if word == Path::new("paper") && !word.exists() => Ok(Config::paper()),
             Some(file) => Config::read(file),
         }
+    }
+}
+
+/// Arguments of all commands that read recordings.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub struct Opening {
+    /// Read files of a recording that lie outside of its folder, too, where links or the paths in cameras.json lead there;
+    /// else they are an error, as pictures may travel to a language model
+    #[arg(long)]
+    follow_links: bool,
+}
+
+impl Opening {
+    /// Opens a recording, and says what it leaves open.
+    fn open(self, dir: &Path) -> crate::error::Result<Recording> {
+        let recording = if self.follow_links { Recording::open_following_links(dir) } else { Recording::open(dir) }?;
+        if !recording.contact_known {
+            eprintln!(
+                "{}: no hand says whether it is in contact (\"contact\"): all samples of a clip count as in contact",
+                shown(dir)
+            );
+        }
+        Ok(recording)
     }
 }
 

@@ -9,12 +9,12 @@ use clap::Args;
 use super::output::{Kind, Output};
 use super::progress::Steps;
 use super::words::{self as model, Asked, WordsArgs};
-use super::{Answer, ConfigFile, keep, print, shown};
-use crate::config::Config;
+use super::{Answer, ConfigFile, Opening, keep, print, shown};
+use crate::config::{self, Config};
 use crate::hands::Trajectory;
 use crate::json;
+use crate::math::Vector;
 use crate::pipeline::{self, Scene};
-use crate::recording::Recording;
 use crate::report::page::FileNote;
 use crate::report::table::aligned;
 use crate::report::{files, page, pictures, words};
@@ -29,6 +29,8 @@ pub struct TwinArgs {
     /// Folder for the twin
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    #[command(flatten)]
+    opening: Opening,
     #[command(flatten)]
     config: ConfigFile,
     /// Keep every intermediate result (trajectories, voxels, lines, candidates, marked images, questions to a language
@@ -63,9 +65,10 @@ const FILES: [FileNote; 15] = [
 pub fn run(args: &TwinArgs) -> anyhow::Result<Answer> {
     let (config, asked) = (args.config.read()?, args.words.open()?);
     if let Some(asked) = asked.as_ref().filter(|a| a.is_dry()) {
-        return asked.count(&[Recording::open(&args.recording)?], &config);
+        return asked.count(&[args.opening.open(&args.recording)?], &config);
     }
-    make(&args.recording, &args.out, &config, args.keep, asked.as_ref())
+    let given = Given { recording: &args.recording, opening: args.opening };
+    make(given, &args.out, &config, args.keep, asked.as_ref())
 }
 
 /// A joint's recorded hands, as `trajectories.json` has them.
@@ -100,8 +103,17 @@ pub fn as_hands(joints: &[JointHands]) -> Vec<Hands<'_>> {
     joints.iter().map(|j| j.clips.iter().map(|(name, t)| (name.clone(), t)).collect()).collect()
 }
 
+/// A recording that is still to be read.
+#[derive(Clone, Copy)]
+pub struct Given<'a> {
+    /// Its folder.
+    pub recording: &'a Path,
+    /// What may be read of it.
+    pub opening: Opening,
+}
+
 pub fn make(
-    recording: &Path,
+    given: Given,
     out: &Path,
     config: &Config,
     keep_steps: bool,
@@ -117,17 +129,17 @@ pub fn make(
             shown(out)
         );
     }
-    let output = Output::new(out, Kind::Twin, &[recording])?;
-    let recording = Recording::open(recording)?;
+    let output = Output::new(out, Kind::Twin, &[given.recording])?;
+    let recording = given.opening.open(given.recording)?;
     let steps = Steps::new();
-    let model::Inferred { mut scene, reasoner, usage, exchanges } =
+    let model::Inferred { mut scene, reasoner, usage, exchanges, lost: unread } =
         model::infer(&recording, config, asked, &steps, keep_steps)?;
     super::infer::weigh(&mut scene, &recording, config, &steps);
     steps.report("fitting boxes", 0, 1);
     let twin = fitting::fit(&scene, &recording.up(), &config.fitting);
     steps.report("simulating", 0, 1);
     let hands = joint_hands(&scene, &twin);
-    let validation = validation::validate(&twin, &as_hands(&hands), &recording.up(), &config.validation)?;
+    let (validation, mut lost) = replayed(&twin, &hands, &recording.up(), &config.validation)?;
     steps.report("writing", 0, 1);
 
     let glb = export::gltf::write(&twin, &validation.words())?;
@@ -150,13 +162,17 @@ pub fn make(
     let notes: Vec<FileNote> = FILES.iter().filter(|f| keep_steps || f.name != "steps/").cloned().collect();
     output.write("index.html", page::render(&scene, &twin, &validation, &glb, &command, &notes)?)?;
     if keep_steps {
-        keep::write(&recording, &scene, &twin, &exchanges, &output)?;
+        lost.extend(keep::write(&recording, &scene, &twin, &exchanges, &output));
     }
     output.finish()?;
     let times = steps.finish();
 
     print(&summary(&scene, &twin, &validation))?;
     let times: Vec<String> = times.iter().map(|(s, t)| format!("{s} {:.2} s", t.as_secs_f64())).collect();
+    for why in &lost {
+        eprintln!("not done: {why}");
+    }
+    let damaged = usage.as_ref().is_some_and(|u| !u.damaged.is_empty());
     if let Some((asked, usage)) = asked.zip(usage) {
         eprintln!("{}", usage.sentence(asked.model()));
     }
@@ -173,7 +189,44 @@ pub fn make(
         shown(&out.join("scene.usda"))
     ))?;
     let refuted = validation.joints.iter().any(|j| j.verdict == Verdict::Fail);
-    Ok(if refuted || twin.furniture.is_empty() { Answer::No } else { Answer::Yes })
+    let whole = lost.is_empty() && unread.is_empty() && twin.left_out.is_empty() && !damaged;
+    Ok(if refuted || twin.furniture.is_empty() || !whole { Answer::No } else { Answer::Yes })
+}
+
+/// The replay of all joints, and what had to be left out of it: a hand that cannot be replayed costs its clip, a joint that
+/// cannot be simulated its hands.
+pub fn replayed(
+    twin: &Twin,
+    hands: &[JointHands],
+    up: &Vector,
+    config: &config::Validation,
+) -> crate::error::Result<(Validation, Vec<String>)> {
+    let mut kept = as_hands(hands);
+    if let Ok(validation) = validation::validate(twin, &kept, up, config) {
+        return Ok((validation, Vec::new()));
+    }
+    let alone = |joint: usize, clips: Hands| -> crate::error::Result<()> {
+        let mut all: Vec<Hands> = vec![Vec::new(); hands.len()];
+        if let Some(own) = all.get_mut(joint) {
+            *own = clips;
+        }
+        validation::validate(twin, &all, up, config).map(|_| ())
+    };
+    let mut lost = Vec::new();
+    for (i, (clips, joint)) in kept.iter_mut().zip(hands).enumerate() {
+        clips.retain(|(name, trajectory)| match alone(i, vec![(name.clone(), *trajectory)]) {
+            Ok(()) => true,
+            Err(error) => {
+                lost.push(format!("replay of clip {name}: {error}"));
+                false
+            }
+        });
+        if let Err(error) = alone(i, clips.clone()) {
+            lost.push(format!("replay of {}: {error}", joint.joint));
+            clips.clear();
+        }
+    }
+    Ok((validation::validate(twin, &kept, up, config)?, lost))
 }
 
 /// A joint's name as that of a file: joints of models from elsewhere may be called anything.

@@ -1,5 +1,6 @@
 //! `--vlm-url` and what goes with it: a language model's words about the pictures.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -11,6 +12,7 @@ use clap::Args;
 use super::progress::Steps;
 use super::{Answer, print};
 use crate::config::Config;
+use crate::error::Error;
 use crate::geometry::segments::Lsd;
 use crate::pipeline::{self, Scene};
 use crate::reasoning::Reasoner;
@@ -231,6 +233,68 @@ pub struct Inferred {
     pub usage: Option<Usage>,
     /// All questions with their answers, where they were to be kept.
     pub exchanges: Vec<Exchange>,
+    /// Files of frames that could not be read, with the reason: the frames were used without them.
+    pub lost: Vec<String>,
+}
+
+/// Frames go wrong one by one on a disk; more than this are an export gone wrong.
+const MOST_BAD_FILES: usize = 8;
+
+/// The pipeline, without the few files of frames that cannot be read.
+fn scene_of(
+    recording: &Recording,
+    config: &Config,
+    reasoner: &dyn Reasoner,
+    progress: pipeline::Progress,
+) -> crate::error::Result<(Scene, Vec<String>)> {
+    let mut recording = Cow::Borrowed(recording);
+    let mut lost = Vec::new();
+    loop {
+        match pipeline::infer(&recording, config, &Lsd, reasoner, progress) {
+            Ok(scene) => {
+                lost.sort();
+                for why in &lost {
+                    eprintln!("left out: {why}");
+                }
+                return Ok((scene, lost));
+            }
+            Err(error) if lost.len() < MOST_BAD_FILES && has_file(&recording, &error) => {
+                forget_file(recording.to_mut(), &error);
+                lost.push(error.to_string());
+            }
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+/// The file that an error is about.
+fn file_of(error: &Error) -> Option<&Path> {
+    match error {
+        Error::Format { path, .. } | Error::Io { path, .. } => Some(path),
+        _ => None,
+    }
+}
+
+/// Whether an error is about a file of one frame.
+fn has_file(recording: &Recording, error: &Error) -> bool {
+    let Some(path) = file_of(error) else { return false };
+    recording.frames.iter().any(|frame| {
+        let f = &frame.files;
+        [&f.rgb, &f.depth, &f.normals, &f.mask, &f.segments].into_iter().any(|file| file.as_deref() == Some(path))
+    })
+}
+
+/// Leaves the file that an error is about out of its frame.
+fn forget_file(recording: &mut Recording, error: &Error) {
+    let Some(path) = file_of(error) else { return };
+    for frame in &mut recording.frames {
+        let f = &mut frame.files;
+        for file in [&mut f.rgb, &mut f.depth, &mut f.normals, &mut f.mask, &mut f.segments] {
+            if file.as_deref() == Some(path) {
+                *file = None;
+            }
+        }
+    }
 }
 
 /// Runs the pipeline, with a model's words where one is to be asked.
@@ -244,20 +308,25 @@ pub fn infer(
     let geometric = Geometric { reasoning: config.reasoning.clone(), inference: config.inference.clone() };
     let report = |step: &str, done: usize, total: usize| steps.report(step, done, total);
     let Some(asked) = asked else {
-        let scene = pipeline::infer(recording, config, &Lsd, &geometric, &report)?;
-        return Ok(Inferred { scene, reasoner: geometric.name().to_owned(), usage: None, exchanges: Vec::new() });
+        let (scene, lost) = scene_of(recording, config, &geometric, &report)?;
+        let reasoner = geometric.name().to_owned();
+        return Ok(Inferred { scene, reasoner, usage: None, exchanges: Vec::new(), lost });
     };
     let model = asked.beside(recording, steps, keep)?;
     let asking = Asking { geometric: &geometric, model: &model, prompts: &asked.prompts, at_once: asked.at_once };
-    let scene = pipeline::infer(recording, config, &Lsd, &asking, &report)?;
+    let (scene, lost) = scene_of(recording, config, &asking, &report)?;
     let reasoner = format!("{} ({})", asking.name(), asked.model());
     let usage = Some(model.usage());
     let exchanges = model.exchanges.into_inner().unwrap_or_else(PoisonError::into_inner);
-    Ok(Inferred { scene, reasoner, usage, exchanges })
+    Ok(Inferred { scene, reasoner, usage, exchanges, lost })
 }
 
 /// The usage after one more recording: the model counts over all of them, stored answers are counted by recording.
 pub fn added(total: Option<Usage>, usage: Option<Usage>) -> Option<Usage> {
-    let before = total.map_or(0, |t| t.from_store);
-    usage.map(|u| Usage { from_store: before + u.from_store, ..u })
+    let (before, damaged) = total.map_or_else(Default::default, |t| (t.from_store, t.damaged));
+    usage.map(|mut u| {
+        u.from_store += before;
+        u.damaged.extend(damaged);
+        u
+    })
 }

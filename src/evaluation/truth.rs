@@ -38,8 +38,8 @@ pub struct Prediction {
     pub recording: String,
     /// Name of the clip.
     pub clip: String,
-    /// Motion type; null = no answer.
-    #[serde(rename = "type")]
+    /// Motion type; null = no answer. A file without the key is another program's, not one without answers.
+    #[serde(rename = "type", deserialize_with = "said")]
     pub kind: Option<JointKind>,
     /// Unit axis, world; positive opens.
     #[serde(default)]
@@ -82,6 +82,32 @@ pub struct Prediction {
     pub refuted: Vec<String>,
 }
 
+/// A value that may be null, but has to be there.
+fn said<'de, D: serde::Deserializer<'de>>(deserializer: D) -> std::result::Result<Option<JointKind>, D::Error> {
+    Option::deserialize(deserializer)
+}
+
+/// What is wrong with the opening that a clip went through, rad or m.
+fn range_fault(kind: JointKind, range: f64) -> Option<String> {
+    // Less than nothing by rounding is nothing.
+    const ROUNDING: f64 = 1e-6;
+    // Nothing of a kitchen slides as far as a room is long.
+    const ROOM_M: f64 = 10.0;
+    if !range.is_finite() {
+        Some(format!("{range} is not finite"))
+    } else if range < -ROUNDING {
+        Some(format!(
+            "{range} is negative: how far the clip opened or closed the part is wanted; the axis says which way opens"
+        ))
+    } else if kind == JointKind::Revolute && range > std::f64::consts::TAU {
+        Some(format!("{range} rad is more than a whole turn: are these degrees?"))
+    } else if kind == JointKind::Prismatic && range > ROOM_M {
+        Some(format!("{range} m is longer than a room: are these millimetres or centimetres?"))
+    } else {
+        None
+    }
+}
+
 impl Predictions {
     /// Reads a file and checks its rows.
     pub fn read(path: &Path) -> Result<Self> {
@@ -107,8 +133,9 @@ impl Predictions {
             if p.range_std.is_some_and(|std| !std.is_finite() || std <= 0.0) {
                 return Err(Error::format(path, place, "range_std must be finite and positive"));
             }
-            if p.kind.is_none() {
-                continue;
+            let Some(kind) = p.kind else { continue };
+            if let Some(fault) = p.range.and_then(|range| range_fault(kind, range)) {
+                return Err(Error::format(path, place, format!("range: {fault}")));
             }
             let axis = p.axis.and_then(|a| unit(&a)).ok_or_else(|| {
                 Error::format(path, place.clone(), "a prediction with a type needs a finite axis that is not zero")
@@ -318,6 +345,29 @@ mod tests {
         assert!(error.contains("r/c") && error.contains("joint_confidence"), "{error}");
         std::fs::write(&path, row.replace("\"joint_confidence\": 1.2", "\"stage\": \"localization\"")).unwrap();
         assert_eq!(Predictions::read(&path).unwrap().predictions[0].stage, Some(Stage::Localization));
+    }
+
+    #[test]
+    fn a_row_needs_a_type_or_null_and_an_opening_that_a_part_can_have() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("p.json");
+        for (rest, words) in [
+            ("", "predictions[0] (r/c): the key \"type\" is missing"),
+            (", \"type\": null, \"range\": 90", ""),
+            (", \"type\": \"revolute\", \"axis\": [0,0,1], \"range\": 1.6", ""),
+            (", \"type\": \"revolute\", \"axis\": [0,0,1], \"range\": 90", "range: 90 rad is more than a whole turn"),
+            (", \"type\": \"prismatic\", \"axis\": [0,0,1], \"range\": 380", "range: 380 m is longer than a room"),
+            (", \"type\": \"prismatic\", \"axis\": [0,0,1], \"range\": -0.3", "range: -0.3 is negative"),
+            (
+                ", \"type\": \"prismatic\", \"axis\": [0,0,1], \"range\": [0, 1]",
+                "range: a list of 2 is given, a number",
+            ),
+        ] {
+            let text = format!("{{\"predictions\": [{{\"recording\": \"r\", \"clip\": \"c\"{rest}}}]}}");
+            std::fs::write(&path, text).unwrap();
+            let error = Predictions::read(&path).err().map(|e| e.to_string()).unwrap_or_default();
+            assert!(error.contains(words) && error.is_empty() == words.is_empty(), "{rest}: {error}");
+        }
     }
 
     #[test]

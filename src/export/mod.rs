@@ -106,67 +106,21 @@ pub fn check(twin: &Twin) -> Result<()> {
         for s in f.carcass.iter().chain(&f.part.solids) {
             take(s.name.clone())?;
             take(format!("{}_visual", s.name))?;
-            check_box(s)?;
         }
-        if f.part.solids.is_empty() || f.carcass.is_empty() {
-            return fault(format!("{id}: a part and its base need at least one box each"));
-        }
-        let joint = &f.part.joint;
-        let unit = (joint.articulation.axis.norm() - 1.0).abs() < 1e-6;
-        // A turn, or the length of a room.
-        let most = match joint.articulation.kind {
-            crate::articulation::JointKind::Revolute => std::f64::consts::TAU,
-            crate::articulation::JointKind::Prismatic => 10.0,
-        };
-        let opens = joint.upper > 0.0 && joint.upper <= most;
-        let resists = [joint.damping, joint.friction].iter().all(|x| x.is_finite() && *x >= 0.0);
-        if !(unit && opens && resists && near(&joint.articulation.origin, FAR_M) && near(&f.part.handle, FAR_M)) {
-            return fault(format!(
-                "{id}: the axis must be a unit vector, the upper limit positive and at most {most:.2}, damping and friction \
-                 not negative, origin and handle within {FAR_M} m"
-            ));
-        }
-        if !([joint.observed, joint.expected].iter().all(|x| x.is_finite()) && is_rotation(&f.part.bounds.rotation)) {
-            return fault(format!(
-                "{id}: observed and expected opening must be finite, the axes of its bounds a rotation"
-            ));
-        }
+        f.check().map_err(Error::Export)?;
     }
     for s in &twin.room {
         take(s.name.clone())?;
         take(format!("{}_visual", s.name))?;
-        check_box(s)?;
+        s.check().map_err(Error::Export)?;
     }
     Ok(())
 }
-
-/// A home is smaller, and single precision still tells millimetres there.
-const FAR_M: f64 = 1e3;
 
 /// Whether a name is one in all formats: USD's are identifiers.
 fn is_name(name: &str) -> bool {
     name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
         && name.chars().next().is_some_and(|c| !c.is_ascii_digit())
-}
-
-fn check_box(s: &Solid) -> Result<()> {
-    let b = &s.shape;
-    let sizes = b.half.iter().all(|h| *h > 0.0 && *h < FAR_M);
-    if sizes && is_rotation(&b.rotation) && near(&b.center, FAR_M) {
-        return Ok(());
-    }
-    Err(Error::Export(format!(
-        "box {}: sizes must be positive, axes right-handed and orthonormal, all within {FAR_M} m",
-        s.name
-    )))
-}
-
-fn is_rotation(m: &Matrix3<f64>) -> bool {
-    (m.transpose() * m - Matrix3::identity()).norm() < 1e-6 && m.determinant() > 0.0
-}
-
-fn near(p: &Point, limit: f64) -> bool {
-    p.coords.iter().all(|c| c.abs() < limit)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use nalgebra::{Matrix3, UnitQuaternion};
 use serde::Deserialize;
 
-use super::{Plan, bounds_of, limits, overlap, place};
+use super::{Plan, bounds_of, limits, overlap, placing::place};
 use crate::articulation::{Articulation, JointKind};
 use crate::config;
 use crate::error::{Error, Result};
@@ -139,11 +139,12 @@ pub fn from_joints(file: &JointsFile, config: &config::Fitting) -> Result<Twin> 
         };
         let config = config::Fitting { carcass_depth_m: found.depth, ..config.clone() };
         let built = place(&plan, &placed, &config)
-            .ok_or("its front shares space with furniture before it in the list")
-            .and_then(|piece| finished(piece, found, &placed, config.density_kg_per_m3));
+            .map_err(|why| why.told("its front shares space with furniture before it in the list"))
+            .and_then(|piece| finished(piece, found, &placed, config.density_kg_per_m3).map_err(str::to_owned))
+            .and_then(|piece| piece.check().map(|()| piece));
         match built {
             Ok(piece) => placed.push((i, piece)),
-            Err(reason) => left_out.push(LeftOut { id: found.joint.id.clone(), reason: reason.to_owned() }),
+            Err(reason) => left_out.push(LeftOut { id: found.joint.id.clone(), reason }),
         }
     }
     Ok(Twin {
@@ -320,6 +321,7 @@ fn found(entry: &Entry, frame: &Frame, config: &config::Fitting) -> Result<Found
     let (joint, upper) = articulation(entry, frame)?;
     let part = entry.part_box.ok_or_else(|| fault(id, "part_box", "is missing: the box around the part, closed"))?;
     let part = frame.shape(id, "part_box", &part)?;
+    hangs_at(id, &joint, &part)?;
     let handle = entry.handle.map(|p| frame.point(id, "handle", &p)).transpose()?;
     let front = entry.front.map(|d| frame.direction(id, "front", &d)).transpose()?;
     let base = entry.base_box.map(|b| frame.shape(id, "base_box", &b)).transpose()?;
@@ -356,6 +358,23 @@ fn found(entry: &Entry, frame: &Frame, config: &config::Fitting) -> Result<Found
         hypotheses: Vec::new(),
     };
     Ok(Found { joint, face, rect, depth: depth.clamp(0.15, 5.0), boxes })
+}
+
+/// A leaf hangs at its hinge: one whose line passes it farther off than the leaf is large is in another frame or unit.
+fn hangs_at(id: &str, joint: &Articulation, part: &OrientedBox) -> Result<()> {
+    let radius = part.half.norm();
+    let distance = (joint.line().project(&part.center) - part.center).norm();
+    // From the middle to the rim, and the whole diagonal beyond it.
+    if joint.kind == JointKind::Prismatic || distance <= 3.0 * radius {
+        return Ok(());
+    }
+    let message = format!(
+        "the hinge passes {:.1} m beside the part, which measures {:.1} m from corner to corner; give a point on the hinge and \
+         the part's box in one frame and one unit",
+        distance - radius,
+        2.0 * radius
+    );
+    Err(fault(id, "origin", &message))
 }
 
 /// Which of a box's sides is the front: the index of its axis, and the direction out of it.
@@ -551,7 +570,7 @@ mod tests {
     #[test]
     fn errors_name_the_joint_and_the_field() {
         type Break = (fn(&mut Entry), &'static str);
-        let breaks: [Break; 14] = [
+        let breaks: [Break; 15] = [
             (|e| e.axis = Some(Vector::new(0.0, 0.0, 2.0)), "joint door: axis: has length 2"),
             (|e| e.axis = Some(Vector::repeat(f64::NAN)), "joint door: axis"),
             (|e| e.axis = None, "joint door: axis: is missing"),
@@ -560,6 +579,7 @@ mod tests {
             (|e| e.range = Some([0.0, 90.0]), "joint door: range: opens by 90.0 rad: are these degrees?"),
             (|e| e.range = Some([0.0, f64::INFINITY]), "joint door: range"),
             (|e| e.origin = Some(Point::new(-300.0, 0.0, 1000.0)), "joint door: origin: lies 1044 m"),
+            (|e| e.origin = Some(Point::new(-30.0, 0.0, 1.0)), "joint door: origin: the hinge passes 29.5 m beside"),
             (|e| e.part_box = None, "joint door: part_box: is missing"),
             (|e| e.part_box = e.part_box.map(|b| OrientedBox { half: b.half * 1e3, ..b }), "joint door: part_box.half"),
             (|e| e.part_box = e.part_box.map(|b| OrientedBox { rotation: -b.rotation, ..b }), "joint door: part_box.R"),

@@ -5,6 +5,7 @@ mod cells;
 pub mod joints;
 mod limits;
 pub mod overlap;
+mod placing;
 mod resistance;
 mod room;
 
@@ -18,6 +19,7 @@ use crate::hands::Trajectory;
 use crate::math::{Vector, any_orthogonal, reject, unit};
 use crate::pipeline::{Scene, SceneJoint};
 use crate::twin::{Furniture, Joint, LeftOut, OrientedBox, Part, Role, Solid, Twin};
+use placing::place;
 
 /// Height of a handle's bar over its face, metres; and half the width of bar and posts.
 const HANDLE_STANDOFF_M: f64 = 0.035;
@@ -68,10 +70,10 @@ pub fn fit_joints(scene: &Scene, joints: &[SceneJoint], up: &Vector, config: &co
     let mut left_out = Vec::new();
     for i in order {
         match place(&plans[i], &placed, config) {
-            Some(furniture) => placed.push((i, furniture)),
-            None => left_out.push(LeftOut {
+            Ok(furniture) => placed.push((i, furniture)),
+            Err(why) => left_out.push(LeftOut {
                 id: plans[i].joint.id.clone(),
-                reason: "its front shares space with furniture that is surer".to_owned(),
+                reason: why.told("its front shares space with furniture that is surer"),
             }),
         }
     }
@@ -95,11 +97,20 @@ pub fn fit_joints(scene: &Scene, joints: &[SceneJoint], up: &Vector, config: &co
         ranks.remove(worst);
     }
     let surroundings = scene.surroundings.as_ref().filter(|_| config.room);
-    let room = surroundings.map_or_else(Vec::new, |cells| room::boxes(cells, &furniture, config));
+    let mut room = surroundings.map_or_else(Vec::new, |cells| room::boxes(cells, &furniture, config));
+    room.retain(|solid| solid.check().is_ok());
     limits::beyond_observed(&mut furniture, &room);
     for (piece, joint) in furniture.iter_mut().zip(joints) {
         resist(&mut piece.part, &hands(scene, joint), up, config);
     }
+    // Whatever a step made of a piece: one that no simulator would load costs itself.
+    furniture.retain(|piece| match piece.check() {
+        Ok(()) => true,
+        Err(reason) => {
+            left_out.push(LeftOut { id: piece.part.id.clone(), reason });
+            false
+        }
+    });
     Twin { name: scene.recording.clone(), density_kg_per_m3: config.density_kg_per_m3, furniture, room, left_out }
 }
 
@@ -130,47 +141,6 @@ fn resist(part: &mut Part, hands: &[&Trajectory], up: &Vector, config: &config::
     // Left open is what hangs about where the hand let go of it.
     let stayed: Vec<f64> = left.iter().filter(|l| l.found >= 0.5 * l.released).map(|l| l.found).collect();
     part.joint.balanced = limits::balanced(part, up, density, &stayed);
-}
-
-/// Builds a piece that shares no space with what stands already: with a shallower carcass (pieces that meet at a corner),
-/// then without the boards that are in the way, then with a smaller front. `None` where even that does not fit.
-fn place(plan: &Plan, placed: &[(usize, Furniture)], config: &config::Fitting) -> Option<Furniture> {
-    const DEPTH_STEP_M: f64 = 0.05;
-    let free = |f: &Furniture| !placed.iter().any(|(_, other)| overlap::furniture(other, f));
-    for share in [1.0, 0.85, 0.7] {
-        let plan = Plan { rect: shrunk(plan, share), ..plan.clone() };
-        let steps = ((config.carcass_depth_m - 0.1) / DEPTH_STEP_M).ceil().max(1.0) as usize;
-        for step in 0..steps {
-            let piece = build(&plan, config.carcass_depth_m - step as f64 * DEPTH_STEP_M, config);
-            if free(&piece) {
-                return Some(piece);
-            }
-        }
-        let mut piece = build(&plan, config.carcass_depth_m, config);
-        let blocked = |s: &Solid| placed.iter().any(|(_, other)| overlap::with(other, &s.shape));
-        piece.carcass.retain(|s| !blocked(s));
-        piece.part.solids.retain(|s| s.role != Role::Tray || !blocked(s));
-        if !piece.carcass.is_empty() && free(&piece) {
-            return Some(piece);
-        }
-    }
-    None
-}
-
-/// The part's rectangle made smaller about the grip; a hinge's edge stays where it is.
-fn shrunk(plan: &Plan, share: f64) -> Rect {
-    let mut bounds = plan.rect.bounds;
-    let hinge = (plan.articulation.kind == JointKind::Revolute).then(|| {
-        usize::from(
-            plan.articulation.axis.dot(&plan.face.up).abs() < plan.articulation.axis.dot(&plan.face.right).abs(),
-        )
-    });
-    for (axis, b) in bounds.iter_mut().enumerate() {
-        if hinge != Some(axis) {
-            *b = b.map(|x| x * share);
-        }
-    }
-    Rect { bounds }
 }
 
 /// Face, rectangle and the joint moved onto them.
@@ -532,6 +502,28 @@ mod tests {
         assert_eq!(part.joint.articulation.axis, -Vector::z());
         assert_eq!(part.solids[0].shape.rotation.column(1).into_owned(), Vector::z());
         assert!((part.handle - Point::new(0.2, -0.035, 0.8)).norm() < 2e-3);
+    }
+
+    #[test]
+    fn a_part_that_cannot_be_built_costs_itself() {
+        let mut lost = scene_joint(JointKind::Prismatic);
+        lost.id = "joint_1".to_owned();
+        lost.observed_range = f64::INFINITY;
+        lost.grip = Point::new(1e200, 0.0, 0.0);
+        lost.face = None;
+        let twin = twin(vec![scene_joint(JointKind::Revolute), lost]);
+        assert_eq!(twin.furniture.iter().map(|f| f.part.id.as_str()).collect::<Vec<_>>(), ["joint_0"]);
+        assert_eq!(twin.left_out.iter().map(|l| l.id.as_str()).collect::<Vec<_>>(), ["joint_1"]);
+        assert!(twin.left_out[0].reason.contains("within 1000 m"), "{:?}", twin.left_out);
+    }
+
+    #[test]
+    fn parts_at_one_place_leave_one_of_them() {
+        let mut again = scene_joint(JointKind::Revolute);
+        again.id = "joint_1".to_owned();
+        let twin = twin(vec![scene_joint(JointKind::Revolute), again]);
+        assert_eq!((twin.furniture.len(), twin.left_out.len()), (1, 1), "{:?}", twin.left_out);
+        twin.furniture[0].check().unwrap();
     }
 
     #[test]

@@ -64,14 +64,16 @@ impl Trajectory {
     /// # Errors
     /// The first fault, in words.
     pub fn check(&self) -> Result<(), String> {
+        // Farther than around the world: an overflow, which would spoil every sum that it is part of.
+        const MAX_M: f64 = 1e8;
         if self.samples.is_empty() {
             return Err("no samples".to_owned());
         }
         let mut last = f64::NEG_INFINITY;
         for (i, s) in self.samples.iter().enumerate() {
-            let finite = s.smoothed.coords.iter().chain(s.observed.coords.iter()).all(|x| x.is_finite());
-            if !finite || !s.time_secs.is_finite() {
-                return Err(format!("sample {i} is not finite"));
+            let mut coordinates = s.smoothed.coords.iter().chain(s.observed.coords.iter());
+            if !coordinates.all(|x| x.abs() < MAX_M) || !s.time_secs.is_finite() {
+                return Err(format!("sample {i} is not finite, or farther away than {MAX_M:e} m"));
             }
             if s.time_secs < last {
                 return Err(format!("sample {i}: time goes back from {last} s to {} s", s.time_secs));
@@ -131,6 +133,7 @@ pub fn trajectory(
     let samples_of = |side: Side, from: usize, to: usize| -> Vec<&HandSample> {
         recording.hands_in(from, to).iter().filter(|s| s.side == side).collect()
     };
+    let use_contact = config.use_contact && recording.contact_known;
     let [from, to] = widened(recording, clip, config.widen_secs);
     let mut in_clip = 0;
     let best = [Side::Right, Side::Left]
@@ -138,7 +141,7 @@ pub fn trajectory(
         .map(|side| {
             let samples = samples_of(side, clip.start_frame, clip.end_frame);
             in_clip += samples.len();
-            if !config.use_contact {
+            if !use_contact {
                 return (samples.len(), side, samples);
             }
             let (score, span) = contact_span(&flags(&samples));
@@ -167,7 +170,7 @@ pub fn trajectory(
     // A blink of the detector; a hand takes as long to reach a handle.
     const SEEN_SECS: f64 = 0.35;
     // Without a flag the samples are the narration's, which knows neither end.
-    let ends_seen = if config.use_contact && score == 0 {
+    let ends_seen = if !recording.contact_known || (use_contact && score == 0) {
         [false; 2]
     } else {
         let time = |s: &HandSample| recording.frames[s.frame].timestamp_secs;
@@ -202,7 +205,12 @@ pub fn trajectory(
         return Outcome::Abstained(format!("fewer than {} believable hand samples in contact", config.min_samples));
     }
     let action = reading.action.unwrap_or_else(|| action_by_person(recording, &samples));
-    Outcome::Found(Trajectory { side: Some(side), samples, action, ends_seen })
+    let trajectory = Trajectory { side: Some(side), samples, action, ends_seen };
+    // Finite input can leave the numbers of a filter: such a clip has no hand, the others have theirs.
+    match trajectory.check() {
+        Ok(()) => Outcome::Found(trajectory),
+        Err(fault) => Outcome::Abstained(format!("the hand cannot be followed: {fault}")),
+    }
 }
 
 /// The filter of §A.2 with the gate of its p-value.
@@ -344,6 +352,7 @@ mod tests {
             frames: frames.collect(),
             clips: Vec::new(),
             hands: (0..6).map(hand).collect(),
+            contact_known: true,
             labels: Default::default(),
             reconstruction: Vec::new(),
             depth_factors: Default::default(),

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use image::{DynamicImage, ImageReader};
+use image::{DynamicImage, ImageDecoder, ImageReader};
 
 use super::{Camera, Grid};
 use crate::error::{Error, Result};
@@ -20,23 +20,23 @@ fn decode(path: &Path, camera: &Camera) -> Result<DynamicImage> {
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(MAX_IMAGE_BYTES);
     reader.limits(limits);
-    let image = reader.decode().map_err(|e| {
+    let wrong = |e: image::ImageError| {
         Error::format(path, "image", format!("cannot be decoded ({e}); export this frame again or delete the file"))
-    })?;
-    if (image.width() as usize, image.height() as usize) != (camera.width, camera.height) {
+    };
+    let decoder = reader.into_decoder().map_err(wrong)?;
+    // Before anything of the size that a header claims is decoded.
+    let (width, height) = decoder.dimensions();
+    if (width as usize, height as usize) != (camera.width, camera.height) {
         return Err(Error::format(
             path,
             "image",
             format!(
-                "is {} x {} but cameras.json says {} x {}; resize one of them (and scale fx, fy, cx, cy)",
-                image.width(),
-                image.height(),
-                camera.width,
-                camera.height
+                "is {width} x {height} but cameras.json says {} x {}; resize one of them (and scale fx, fy, cx, cy)",
+                camera.width, camera.height
             ),
         ));
     }
-    Ok(image)
+    DynamicImage::from_decoder(decoder).map_err(wrong)
 }
 
 fn grid<T>(camera: &Camera, data: Vec<T>) -> Grid<T> {

@@ -3,10 +3,12 @@
 //! The layout on disk is described in `docs/recording-format.md`.
 
 pub mod at_work;
+mod folder;
 pub mod grid;
 pub mod images;
 pub mod narration;
 mod read;
+mod reconstruction;
 pub mod segments;
 pub mod sketch;
 pub mod trajectory;
@@ -161,6 +163,8 @@ pub struct Recording {
     pub clips: Vec<Clip>,
     /// Hands, by frame.
     pub hands: Vec<HandSample>,
+    /// Whether a detector said which hands are in contact; where none did, all samples of a clip count.
+    pub contact_known: bool,
     /// Mask class to name.
     pub labels: BTreeMap<u8, String>,
     /// Points of a static reconstruction (`reconstruction.ply` or `.obj`), world frame; empty where there is none.
@@ -193,9 +197,21 @@ impl DepthFactors {
 }
 
 impl Recording {
-    /// Reads and checks a folder. All faults are reported at once.
+    /// Reads and checks a folder. All faults are reported at once; a file that lies elsewhere, by a link or by the path that
+    /// `cameras.json` gives, is one.
+    ///
+    /// # Errors
+    /// Where the folder is no recording that can be used.
     pub fn open(dir: &std::path::Path) -> Result<Self> {
-        read::open(dir)
+        read::open(dir, false)
+    }
+
+    /// The same, but links and paths may lead out of the folder.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn open_following_links(dir: &std::path::Path) -> Result<Self> {
+        read::open(dir, true)
     }
 
     /// The world's up direction (+Z by convention; good to about a degree).

@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Quaternion, UnitQuaternion};
 use serde::Deserialize;
 
-use super::{Camera, Clip, Frame, FrameFiles, HandSample, Recording, Side};
+use super::folder::{Folder, MAX_COORDINATE};
+use super::{Camera, Clip, Frame, FrameFiles, HandSample, Recording, Side, reconstruction};
 use crate::error::{Error, Result};
 use crate::json;
 use crate::math::{Point, Pose, Vector, stats};
@@ -63,7 +64,7 @@ struct HandsFrame {
 struct HandEntry {
     side: Side,
     #[serde(default)]
-    contact: bool,
+    contact: Option<bool>,
     joints_world: Vec<[f64; 3]>,
 }
 
@@ -96,7 +97,18 @@ impl Faults {
     }
 }
 
-pub(super) fn open(dir: &Path) -> Result<Recording> {
+/// The tables of a recording; images are named by frame.
+const TABLES: [&str; 7] = [
+    "cameras.json",
+    "clips.json",
+    "hands.json",
+    "fingertips.csv",
+    "labels.json",
+    "reconstruction.ply",
+    "reconstruction.obj",
+];
+
+pub(super) fn open(dir: &Path, follow_links: bool) -> Result<Recording> {
     if !dir.is_dir() {
         let message = if dir.exists() {
             "is a file; a recording is a folder with cameras.json, clips.json and hands.json"
@@ -105,16 +117,21 @@ pub(super) fn open(dir: &Path) -> Result<Recording> {
         };
         return Err(Error::Io { path: dir.to_owned(), message: message.to_owned() });
     }
+    let folder = Folder::new(dir, follow_links)?;
+    let elsewhere: Vec<String> = TABLES.iter().filter_map(|name| folder.file(name).err()).collect();
+    if !elsewhere.is_empty() {
+        return Err(Error::Recording { path: dir.to_owned(), faults: elsewhere });
+    }
     let mut faults = Faults::default();
     let cameras: CamerasFile = json::read(&dir.join("cameras.json"))?;
     let clips: ClipsFile = json::read(&dir.join("clips.json"))?;
     let camera = check_camera(&cameras, &mut faults);
-    let frames = frames(dir, &cameras, &mut faults);
+    let frames = frames(&folder, &cameras, &mut faults);
     check_clips(&clips.clips, frames.len(), &mut faults);
-    let hands = hands(dir, frames.len(), &mut faults)?;
-    check_hands(&hands, &frames, &mut faults);
+    let Hands { samples: hands, contact_known } = hands(dir, frames.len(), &mut faults)?;
+    check_hands(&hands, contact_known, &frames, &mut faults);
     let labels = labels(dir)?;
-    let reconstruction = reconstruction(dir)?;
+    let reconstruction = reconstruction::read(dir)?;
     faults.finish(dir)?;
 
     let name = dir
@@ -129,6 +146,7 @@ pub(super) fn open(dir: &Path) -> Result<Recording> {
         frames,
         clips: clips.clips,
         hands,
+        contact_known,
         labels,
         reconstruction,
         depth_factors: super::DepthFactors::default(),
@@ -142,11 +160,13 @@ fn check_camera(file: &CamerasFile, faults: &mut Faults) -> Camera {
     if width == 0 || height == 0 || width.saturating_mul(height) > 64 << 20 {
         faults.add("size", format!("cameras.json: image size {width} x {height} is not a camera's"));
     }
-    if !(fx.is_finite() && fy.is_finite() && fx > 1.0 && fy > 1.0) {
+    // A thousand image widths see a thousandth of a radian: no lens of a head-worn camera, and far from an overflow.
+    let widest = 1e3 * width.max(height) as f64;
+    if ![fx, fy].iter().all(|f| *f > 1.0 && *f < widest) {
         faults.add("focal", format!("cameras.json: fx {fx}, fy {fy} must be focal lengths in pixels"));
     }
-    if !(cx.is_finite() && cy.is_finite()) {
-        faults.add("centre", format!("cameras.json: cx {cx}, cy {cy} must be finite pixels"));
+    if ![cx, cy].iter().all(|c| c.abs() < widest) {
+        faults.add("centre", format!("cameras.json: cx {cx}, cy {cy} must be pixels on the image or near it"));
     }
     if let Some(units) = &file.units
         && !["m", "metre", "metres", "meter", "meters"].contains(&units.as_str())
@@ -168,15 +188,10 @@ fn check_camera(file: &CamerasFile, faults: &mut Faults) -> Camera {
     Camera { width, height, fx, fy, cx, cy }
 }
 
-fn frames(dir: &Path, file: &CamerasFile, faults: &mut Faults) -> Vec<Frame> {
+fn frames(folder: &Folder, file: &CamerasFile, faults: &mut Faults) -> Vec<Frame> {
     if file.frames.is_empty() {
         faults.add("frames", "cameras.json: no frames".to_owned());
     }
-    let has_images = dir.join("frames").is_dir();
-    let optional = |folder: &str, index: usize| -> Option<PathBuf> {
-        let path = dir.join(folder).join(format!("{index:06}.png"));
-        path.is_file().then_some(path)
-    };
     let mut last = f64::NEG_INFINITY;
     let mut out = Vec::with_capacity(file.frames.len());
     for (index, entry) in file.frames.iter().enumerate() {
@@ -184,13 +199,10 @@ fn frames(dir: &Path, file: &CamerasFile, faults: &mut Faults) -> Vec<Frame> {
         if entry.frame != index {
             faults.add("index", format!("{place}: is entry {index}; frames must be numbered 0, 1, 2, ... in order"));
         }
-        if !entry.timestamp.is_finite() || entry.timestamp < last {
-            faults.add("time", format!("{place}: timestamp {} s does not follow {last} s", entry.timestamp));
-        } else {
-            last = entry.timestamp;
-        }
-        if entry.position.iter().any(|x| !x.is_finite()) {
-            faults.add("position", format!("{place}: position is not finite; drop the frame or interpolate its pose"));
+        check_time(entry.timestamp, &mut last, &place, faults);
+        if !entry.position.iter().all(|x| x.abs() < MAX_COORDINATE) {
+            let fault = "position is not finite or overflows; drop the frame or interpolate its pose";
+            faults.add("position", format!("{place}: {fault}"));
         }
         let [w, x, y, z] = entry.rotation_wxyz;
         let q = Quaternion::new(w, x, y, z);
@@ -200,34 +212,76 @@ fn frames(dir: &Path, file: &CamerasFile, faults: &mut Faults) -> Vec<Frame> {
                 format!("{place}: rotation_wxyz has norm {:.4}, a rotation has norm 1 (order is w x y z)", q.norm()),
             );
         }
-        let rgb = match &entry.file {
-            Some(name) if has_images => {
-                let path = dir.join(name);
-                if !path.is_file() {
-                    faults.add("image", format!("{place}: {name} is listed but not there"));
-                }
-                Some(path)
-            }
-            _ => None,
-        };
         out.push(Frame {
             timestamp_secs: entry.timestamp,
             world_from_camera: Pose::from_parts(
                 Vector::from(entry.position).into(),
                 UnitQuaternion::from_quaternion(if q.norm() > 0.0 { q } else { Quaternion::identity() }),
             ),
-            files: FrameFiles {
-                rgb,
-                depth: optional("depth", index),
-                normals: optional("normals", index),
-                mask: optional("masks", index),
-                segments: [format!("{index:06}.npz"), format!("{index:06}.txt"), format!("segments_{index}.txt")]
-                    .map(|name| dir.join("segments").join(name))
-                    .into_iter()
-                    .find(|path| path.is_file()),
-            },
+            files: files(folder, entry, index, &place, faults),
         });
     }
+    check_scale(&out, faults);
+    out
+}
+
+/// Times increase strictly: a speed is a distance over a time.
+fn check_time(time: f64, last: &mut f64, place: &str, faults: &mut Faults) {
+    // Between two frames of one recording; what is further apart was taken by two clocks.
+    const DAY_SECS: f64 = 86_400.0;
+    if !time.is_finite() || time < *last {
+        faults.add("time", format!("{place}: timestamp {time} s does not follow {last} s"));
+        return;
+    }
+    if time == *last {
+        let fault =
+            format!("timestamp {time} s is that of the frame before; times must increase, leave one of the frames out");
+        faults.add("time", format!("{place}: {fault}"));
+    } else if last.is_finite() && time - *last > DAY_SECS {
+        let fault = format!("timestamp {time} s is more than a day after {last} s; write seconds of one clock");
+        faults.add("time", format!("{place}: {fault}"));
+    }
+    *last = time;
+}
+
+/// What a frame has on disk.
+fn files(folder: &Folder, entry: &FrameEntry, index: usize, place: &str, faults: &mut Faults) -> FrameFiles {
+    let mut found = |names: &[String]| -> Option<PathBuf> {
+        for name in names {
+            match folder.file(name) {
+                Ok(Some(path)) => return Some(path),
+                Ok(None) => {}
+                Err(fault) => faults.add("elsewhere", format!("frame {index}: {fault}")),
+            }
+        }
+        None
+    };
+    let numbered = |of: &str| [format!("{of}/{index:06}.png")];
+    let [depth, normals, mask] = ["depth", "normals", "masks"].map(|of| found(&numbered(of)));
+    let segments = [format!("{index:06}.npz"), format!("{index:06}.txt"), format!("segments_{index}.txt")]
+        .map(|name| format!("segments/{name}"));
+    let segments = found(&segments);
+    let rgb = match &entry.file {
+        // Listed or not, images that are there are seen.
+        None => found(&["jpg", "jpeg", "png"].map(|ending| format!("frames/{index:06}.{ending}"))),
+        Some(name) => match folder.file(name) {
+            Ok(Some(path)) => Some(path),
+            Ok(None) => {
+                let way = "bring the image, or leave \"file\" out of cameras.json to go without";
+                faults.add("image", format!("{place}: {name} is listed but not there; {way}"));
+                None
+            }
+            Err(fault) => {
+                faults.add("elsewhere", format!("{place}: {fault}"));
+                None
+            }
+        },
+    };
+    FrameFiles { rgb, depth, normals, mask, segments }
+}
+
+/// Seconds and metres, as far as all frames together tell.
+fn check_scale(out: &[Frame], faults: &mut Faults) {
     let steps: Vec<f64> = out.windows(2).map(|w| w[1].timestamp_secs - w[0].timestamp_secs).collect();
     if let Some(step) = stats::median(&steps).filter(|s| s.is_finite() && !(1e-3..=10.0).contains(s)) {
         faults.add(
@@ -235,15 +289,15 @@ fn frames(dir: &Path, file: &CamerasFile, faults: &mut Faults) -> Vec<Frame> {
             format!("cameras.json: frames are {step:.3e} s apart (median), a video's are 0.005 to 1 s; write seconds"),
         );
     }
-    let furthest = out.iter().map(|f| f.center().coords.norm()).fold(0.0, f64::max);
+    let near = |f: &&Frame| f.center().coords.iter().all(|c| c.abs() < MAX_COORDINATE);
+    let furthest = out.iter().filter(near).map(|f| f.center().coords.norm()).fold(0.0, f64::max);
     // Head-worn recordings stay in a home; a home measured in millimetres is a city.
-    if furthest.is_finite() && furthest > 1000.0 {
+    if furthest > 1000.0 {
         faults.add(
             "units",
             format!("cameras.json: a camera is {furthest:.0} from the origin; positions must be metres (are these millimetres?)"),
         );
     }
-    out
 }
 
 fn check_clips(clips: &[Clip], frames: usize, faults: &mut Faults) {
@@ -271,10 +325,17 @@ fn check_clips(clips: &[Clip], frames: usize, faults: &mut Faults) {
     }
 }
 
-fn hands(dir: &Path, frames: usize, faults: &mut Faults) -> Result<Vec<HandSample>> {
+/// All hands of a recording.
+struct Hands {
+    samples: Vec<HandSample>,
+    /// Whether any of them says whether it is in contact.
+    contact_known: bool,
+}
+
+fn hands(dir: &Path, frames: usize, faults: &mut Faults) -> Result<Hands> {
     let full = dir.join("hands.json");
     let tips = dir.join("fingertips.csv");
-    let mut samples = if full.is_file() {
+    let mut hands = if full.is_file() {
         hands_json(&full, faults)?
     } else if tips.is_file() {
         fingertips_csv(&tips)?
@@ -285,24 +346,26 @@ fn hands(dir: &Path, frames: usize, faults: &mut Faults) -> Result<Vec<HandSampl
         });
     };
     let name = if full.is_file() { "hands.json" } else { "fingertips.csv" };
-    samples.retain(|s| {
+    hands.samples.retain(|s| {
         let inside = s.frame < frames;
         if !inside {
             faults.add("hand frame", format!("{name}: frame {}: the video has {frames} frames", s.frame));
         }
-        let finite = s.tips.iter().all(|p| p.coords.iter().all(|x| x.is_finite()));
+        let finite = s.tips.iter().all(|p| p.coords.iter().all(|x| x.abs() < MAX_COORDINATE));
         if !finite {
-            faults.add("hand", format!("{name}: frame {}: a fingertip is not finite; leave the hand out", s.frame));
+            let fault = "a fingertip is not finite or overflows; leave the hand out";
+            faults.add("hand", format!("{name}: frame {}: {fault}", s.frame));
         }
         inside && finite
     });
-    samples.sort_by_key(|s| (s.frame, s.side));
-    Ok(samples)
+    hands.samples.sort_by_key(|s| (s.frame, s.side));
+    Ok(hands)
 }
 
-fn hands_json(path: &Path, faults: &mut Faults) -> Result<Vec<HandSample>> {
+fn hands_json(path: &Path, faults: &mut Faults) -> Result<Hands> {
     let file: HandsFile = json::read(path)?;
     let mut samples = Vec::new();
+    let mut contact_known = false;
     for frame in file.frames {
         for hand in frame.hands {
             let Some(tips) = TIP_JOINTS.iter().map(|&j| hand.joints_world.get(j)).collect::<Option<Vec<_>>>() else {
@@ -311,10 +374,12 @@ fn hands_json(path: &Path, faults: &mut Faults) -> Result<Vec<HandSample>> {
                 continue;
             };
             let tips = [0, 1, 2].map(|i| Point::from(*tips[i]));
-            samples.push(HandSample { frame: frame.frame, side: hand.side, contact: hand.contact, tips });
+            contact_known |= hand.contact.is_some();
+            let contact = hand.contact.unwrap_or(false);
+            samples.push(HandSample { frame: frame.frame, side: hand.side, contact, tips });
         }
     }
-    Ok(samples)
+    Ok(Hands { samples, contact_known })
 }
 
 /// Reads a line of at most [`MAX_LINE_BYTES`]; `None` at the end of the file.
@@ -332,7 +397,7 @@ pub(super) fn bounded_line(reader: &mut impl BufRead, path: &Path, number: usize
     Ok(Some(text.trim_end_matches(['\n', '\r']).to_owned()))
 }
 
-fn fingertips_csv(path: &Path) -> Result<Vec<HandSample>> {
+fn fingertips_csv(path: &Path) -> Result<Hands> {
     const TIPS: [[&str; 3]; 3] =
         [["thumb_x", "thumb_y", "thumb_z"], ["index_x", "index_y", "index_z"], ["middle_x", "middle_y", "middle_z"]];
     let file = File::open(path).map_err(|e| Error::io(path, &e))?;
@@ -345,7 +410,8 @@ fn fingertips_csv(path: &Path) -> Result<Vec<HandSample>> {
             Error::format(path, "line 1", format!("no column \"{name}\"; found: {}", columns.join(", ")))
         })
     };
-    let (frame, side, contact) = (column("frame")?, column("side")?, column("contact")?);
+    let (frame, side) = (column("frame")?, column("side")?);
+    let contact = columns.iter().position(|c| *c == "contact");
     let mut tip_columns = [[0; 3]; 3];
     for (tip, names) in tip_columns.iter_mut().zip(TIPS) {
         for (index, name) in tip.iter_mut().zip(names) {
@@ -385,14 +451,20 @@ fn fingertips_csv(path: &Path) -> Result<Vec<HandSample>> {
         for (tip, columns) in tips.iter_mut().zip(tip_columns) {
             *tip = Point::new(number_at(columns[0])?, number_at(columns[1])?, number_at(columns[2])?);
         }
-        let contact = matches!(cells[contact], "1" | "true" | "True");
+        let contact = match contact.map(|column| cells[column]) {
+            Some("1" | "true" | "True") => true,
+            None | Some("0" | "false" | "False") => false,
+            Some(other) => {
+                return Err(Error::format(path, place(), format!("column contact: \"{other}\" is not 0 or 1")));
+            }
+        };
         samples.push(HandSample { frame: index, side, contact, tips });
     }
-    Ok(samples)
+    Ok(Hands { samples, contact_known: contact.is_some() })
 }
 
 /// A hand's own size tells the unit of the file, whatever the scene is like.
-fn check_hands(hands: &[HandSample], frames: &[Frame], faults: &mut Faults) {
+fn check_hands(hands: &[HandSample], contact_known: bool, frames: &[Frame], faults: &mut Faults) {
     if hands.is_empty() {
         faults.add("hands", "hands.json / fingertips.csv: no hand in any frame".to_owned());
         return;
@@ -421,11 +493,11 @@ fn check_hands(hands: &[HandSample], frames: &[Frame], faults: &mut Faults) {
             ),
         );
     }
-    if !hands.iter().any(|s| s.contact) {
+    if contact_known && !hands.iter().any(|s| s.contact) {
         faults.add(
             "contact",
-            "hands: no sample is in contact; run a contact detector and fill \"contact\"; true in every sample means that \
-             nobody knows, and goes with hands.use_contact = false in the config"
+            "hands: no sample is in contact; run a contact detector and fill \"contact\", or leave \"contact\" out of all \
+             hands where nobody knows: then all samples of a clip count, as with hands.use_contact = false in the config"
                 .to_owned(),
         );
     }
@@ -443,70 +515,4 @@ fn labels(dir: &Path) -> Result<BTreeMap<u8, String>> {
             Err(_) => Err(Error::format(&path, format!("key \"{class}\""), "classes are numbers 1 to 255")),
         })
         .collect()
-}
-
-fn reconstruction(dir: &Path) -> Result<Vec<Point>> {
-    let (ply, obj) = (dir.join("reconstruction.ply"), dir.join("reconstruction.obj"));
-    let points = if ply.is_file() {
-        ply_points(&ply)?
-    } else if obj.is_file() {
-        obj_points(&obj)?
-    } else {
-        return Ok(Vec::new());
-    };
-    let finite: Vec<Point> = points.into_iter().filter(|p| p.coords.iter().all(|x| x.is_finite())).collect();
-    if finite.is_empty() {
-        let file = if ply.is_file() { ply } else { obj };
-        return Err(Error::format(
-            &file,
-            "vertices",
-            "no finite points (of an OBJ only vertices in faces count); use PLY",
-        ));
-    }
-    Ok(finite)
-}
-
-#[derive(Default)]
-struct PlyVertex([f64; 3]);
-
-impl ply_rs_bw::ply::PropertyAccess for PlyVertex {
-    fn new() -> Self {
-        Self::default()
-    }
-
-    fn set_float(&mut self, name: &str, value: f32) -> ply_rs_bw::ply::PropertyAccessResult {
-        self.set_double(name, f64::from(value))
-    }
-
-    fn set_double(&mut self, name: &str, value: f64) -> ply_rs_bw::ply::PropertyAccessResult {
-        let index = match name {
-            "x" => 0,
-            "y" => 1,
-            "z" => 2,
-            _ => return ply_rs_bw::ply::PropertyAccessResult::Ignored,
-        };
-        self.0[index] = value;
-        ply_rs_bw::ply::PropertyAccessResult::Set
-    }
-}
-
-fn ply_points(path: &Path) -> Result<Vec<Point>> {
-    let file = File::open(path).map_err(|e| Error::io(path, &e))?;
-    let mut reader = BufReader::new(file);
-    let ply = ply_rs_bw::parser::Parser::<PlyVertex>::new().read_ply(&mut reader).map_err(|e| {
-        Error::format(path, "ply", format!("cannot be read ({e}); write it again as binary or ASCII PLY"))
-    })?;
-    let vertices = ply.payload.get("vertex").ok_or_else(|| Error::format(path, "header", "no element \"vertex\""))?;
-    Ok(vertices.iter().map(|v| Point::from(v.0)).collect())
-}
-
-fn obj_points(path: &Path) -> Result<Vec<Point>> {
-    let options = tobj::LoadOptions { ignore_points: false, ..Default::default() };
-    let (models, _) = tobj::load_obj(path, &options)
-        .map_err(|e| Error::format(path, "obj", format!("cannot be read ({e}); export the mesh again")))?;
-    Ok(models
-        .iter()
-        .flat_map(|m| m.mesh.positions.chunks_exact(3))
-        .map(|c| Point::new(f64::from(c[0]), f64::from(c[1]), f64::from(c[2])))
-        .collect())
 }

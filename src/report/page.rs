@@ -87,11 +87,13 @@ pub fn render(
         .iter()
         .map(|c| {
             let joint = scene.joint_of(&c.clip.clip);
+            let left = joint.and_then(|j| twin.left_out.iter().find(|left| left.id == j.id));
+            let not_built = left.map_or_else(String::new, |left| format!("; not built: {}", left.reason));
             ClipRow {
                 clip: &c.clip.clip,
                 narration: &c.clip.narration,
                 outcome: joint.map_or("abstained".to_owned(), |j| j.id.clone()),
-                reason: words::clip_reason(c, joint),
+                reason: words::clip_reason(c, joint) + &not_built,
             }
         })
         .collect();

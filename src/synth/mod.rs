@@ -195,6 +195,19 @@ fn camera(width: usize, is_benchmark: bool) -> Camera {
     Camera { width, height, fx: focal, fy: focal, cx: 0.5 * (width as f64 - 1.0), cy: 0.5 * (height as f64 - 1.0) }
 }
 
+/// Makes times increase strictly: a still that was taken in the very moment in which a motion begins is half-way between
+/// the frames around it. Errors and pictures were drawn before and stay as they are.
+fn part_times(frames: &mut [person::TrueFrame]) {
+    let mut before = None;
+    for i in 0..frames.len().saturating_sub(1) {
+        let (time, next) = (frames[i].time_secs, frames[i + 1].time_secs);
+        if time >= next {
+            frames[i].time_secs = before.map_or(next - 1.0 / person::FPS, |before: f64| 0.5 * (before + next));
+        }
+        before = Some(frames[i].time_secs);
+    }
+}
+
 fn enough_parts(options: &Options, kitchen: &kitchen::Kitchen) -> Result<()> {
     if options.parts > kitchen.parts.len() {
         let (asked, has) = (options.parts, kitchen.parts.len());
@@ -255,6 +268,7 @@ impl Recorded {
         if let Some(count) = changes.few_hands {
             noise::keep_few(&mut seen, &take, count, &mut stream(Stream::FewHands));
         }
+        part_times(&mut take.frames);
         Ok(Self { options: *options, kitchen, take, seen, camera, up, has_masks: !changes.no_masks })
     }
 
@@ -394,6 +408,18 @@ mod tests {
         let blind = recorded(7, Tier::T1, 1, &Changes { no_masks: true, ..Changes::default() });
         assert!(blind.images(0).unwrap().iter().all(|(name, _)| !name.starts_with("masks")));
         assert!(blind.tables().unwrap().iter().all(|(name, _)| name != "labels.json"));
+    }
+
+    #[test]
+    fn no_two_frames_have_one_time() {
+        for tier in Tier::value_variants() {
+            for seed in [5, 6] {
+                let options = Options { seed, tier: *tier, width: 64, parts: 3 };
+                let r = Recorded::new(&options).unwrap();
+                let times: Vec<f64> = r.take.frames.iter().map(|f| f.time_secs).collect();
+                assert!(times.windows(2).all(|w| w[1] > w[0]), "{tier:?} {seed}");
+            }
+        }
     }
 
     #[test]

@@ -7,7 +7,7 @@ pub mod absent;
 pub mod server;
 pub mod store;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 use crate::error::Result;
@@ -102,6 +102,8 @@ pub struct Usage {
     pub requests: usize,
     /// Questions that a stored answer settled.
     pub from_store: usize,
+    /// Stored answers that cannot be read, each with what is wrong with it: they count as no answer.
+    pub damaged: BTreeSet<String>,
     /// Questions not asked because all allowed requests were used.
     pub refused: usize,
     /// Questions without a usable answer, by reason.
@@ -148,6 +150,9 @@ impl Usage {
         if self.failures() > 0 {
             let reasons: Vec<String> = self.failed.iter().map(|(reason, n)| format!("{n} x {reason}")).collect();
             let _ = write!(text, ", {} without an answer: {}", self.failures(), reasons.join("; "));
+        }
+        for damaged in &self.damaged {
+            let _ = write!(text, "\n{damaged}; mend or delete this answer");
         }
         text
     }

@@ -1,8 +1,10 @@
 //! Answers on disk, one JSON file each, named by what was asked: a second run asks nothing.
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -34,6 +36,7 @@ pub struct Stored<M> {
     writes: bool,
     from_store: AtomicUsize,
     written: AtomicUsize,
+    damaged: Mutex<BTreeSet<String>>,
 }
 
 impl<M: Model> Stored<M> {
@@ -61,6 +64,7 @@ impl<M: Model> Stored<M> {
             writes: false,
             from_store: AtomicUsize::new(0),
             written: AtomicUsize::new(0),
+            damaged: Mutex::default(),
         }
     }
 
@@ -95,9 +99,17 @@ impl<M: Model> Model for Stored<M> {
     fn ask(&self, question: &Question) -> Result<Option<String>> {
         let path = self.path(question);
         if path.is_file() {
-            let record: Record = json::read(&path)?;
-            self.from_store.fetch_add(1, Ordering::Relaxed);
-            return Ok(Some(record.answer));
+            // A damaged one is not asked for again: somebody may have mended it by hand, all but a comma.
+            return Ok(match json::read::<Record>(&path) {
+                Ok(record) => {
+                    self.from_store.fetch_add(1, Ordering::Relaxed);
+                    Some(record.answer)
+                }
+                Err(error) => {
+                    self.damaged.lock().unwrap_or_else(PoisonError::into_inner).insert(error.to_string());
+                    None
+                }
+            });
         }
         let answer = self.inner.ask(question)?;
         if let Some(answer) = answer.as_deref().filter(|_| self.writes) {
@@ -111,8 +123,10 @@ impl<M: Model> Model for Stored<M> {
     }
 
     fn usage(&self) -> Usage {
-        let usage = self.inner.usage();
-        Usage { from_store: usage.from_store + self.from_store.load(Ordering::Relaxed), ..usage }
+        let mut usage = self.inner.usage();
+        usage.from_store += self.from_store.load(Ordering::Relaxed);
+        usage.damaged.extend(self.damaged.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned());
+        usage
     }
 }
 
@@ -192,11 +206,14 @@ mod tests {
     }
 
     #[test]
-    fn a_damaged_answer_is_named() {
+    fn a_damaged_answer_costs_itself_and_is_named() {
         let dir = tempfile::tempdir().unwrap();
         let stored = Stored::new(Replay::new("m"), dir.path()).unwrap();
         let q = question("a", &[1]);
         std::fs::write(stored.path(&q), "{").unwrap();
-        assert!(stored.ask(&q).unwrap_err().to_string().contains(".json"));
+        assert_eq!(stored.ask(&q).unwrap(), None);
+        let usage = stored.usage();
+        assert!(usage.damaged.len() == 1 && usage.sentence("m").contains(".json: line 1"), "{usage:?}");
+        assert_eq!(std::fs::read_to_string(stored.path(&q)).unwrap(), "{");
     }
 }

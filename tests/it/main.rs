@@ -12,6 +12,7 @@ mod formats;
 mod known_truth;
 mod physics;
 mod real_recordings;
+mod robust;
 mod same_bytes;
 mod simulators;
 mod words;
