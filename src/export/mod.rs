@@ -12,7 +12,7 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
 use crate::error::{Error, Result};
 use crate::math::{Point, Pose, Vector, eigen_descending};
-use crate::twin::{OrientedBox, Role, Solid, Twin};
+use crate::twin::{OrientedBox, Role, Twin};
 
 /// Every role, in the order of the materials.
 pub(crate) const ROLES: [Role; 5] = [Role::Front, Role::Handle, Role::Tray, Role::Carcass, Role::Room];
