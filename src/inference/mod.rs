@@ -25,11 +25,11 @@ pub struct ClipJoint {
     pub contact_pivot: Point,
     /// Where the axis comes from.
     pub source: AxisSource,
-    /// Probability of the type.
-    pub type_probability: f64,
+    /// Probability of the type; `None` where nobody computed one, as under the paper's rule.
+    pub type_probability: Option<f64>,
     /// Probability that type, axis and hinge are right, see [`is_right`]: of the weight of all explanations the share under
-    /// which they are.
-    pub joint_probability: f64,
+    /// which they are; `None` as above.
+    pub joint_probability: Option<f64>,
     /// Root mean square distance of the smoothed hand from the joint's path, metres.
     pub residual_m: f64,
     /// Share of hand samples within the torus (§B.1) or the slide's tolerance.
@@ -120,8 +120,8 @@ pub fn infer(
         joint,
         contact_pivot,
         source: best.source,
-        type_probability,
-        joint_probability: type_probability * agreeing_share(&best.joint, &all),
+        type_probability: Some(type_probability),
+        joint_probability: Some(type_probability * agreeing_share(&best.joint, &all)),
         residual_m: residual,
         inliers,
         radius_m,
