@@ -224,13 +224,13 @@ pub fn agreeing_share(best: &Articulation, all: &[(Articulation, f64)]) -> f64 {
     if total > 0.0 { agreeing / total } else { 0.0 }
 }
 
-/// Whether an answer is right if `truth` is the joint, by the paper's limits (§4) as [`crate::evaluation::Rule::PawsLine`] reads
+/// Whether an answer is right if `other` is the joint, by the paper's limits (§4) as [`crate::evaluation::Rule::PawsLine`] reads
 /// them: of its type, directions within 15 degrees, the true hinge within 25 cm of the answer's line.
 #[must_use]
-pub fn is_right(answer: &Articulation, truth: &Articulation) -> bool {
+pub fn is_right(answer: &Articulation, other: &Articulation) -> bool {
     const ANGLE_DEG: f64 = 15.0;
     const HINGE_M: f64 = 0.25;
-    answer.kind == truth.kind && near(answer, truth, ANGLE_DEG, HINGE_M)
+    answer.kind == other.kind && near(answer, other, ANGLE_DEG, HINGE_M)
 }
 
 /// Whether two joints are one explanation: hand and depth seldom tell joints apart that are within 8 degrees and 8 cm.
