@@ -321,7 +321,8 @@ mod tests {
         // Three answers, one of another type and one 25 cm off; and a hand that has none, held 40 cm higher.
         let (off, right) = (turn(-0.25), turn(0.0));
         let higher: Vec<Point> = (0..30).map(|i| arc(i) + Vector::new(0.0, 0.0, 0.4)).collect();
-        let paths = [(0..30).map(arc).collect(), (0..30).map(arc).collect(), (0..6).map(arc).collect(), higher];
+        let paths: [Vec<Point>; 4] =
+            [(0..30).map(arc).collect(), (0..30).map(arc).collect(), (0..6).map(arc).collect(), higher];
         let (winner, joint) = together(&[&off, &right, &pulled], &paths, &config).unwrap();
         assert_eq!((winner, joint.kind), (1, JointKind::Revolute));
         assert!(joint.origin.coords.xy().norm() < 1e-9, "{joint:?}");
