@@ -303,7 +303,7 @@ fn score_axes(c: &mut Criterion) {
             (paths, lines, (0..clips as i64).map(|i| i64::from(i % 5 < 2)).collect())
         }
     };
-    let clips: Vec<(Trajectory, Vec<AxisCandidate>, f64)> = paths
+    let clips: Vec<(Trajectory, Vec<AxisCandidate>, JointKind)> = paths
         .iter()
         .zip(lines)
         .zip(&kinds)
@@ -321,13 +321,13 @@ fn score_axes(c: &mut Criterion) {
                 let joint = Articulation { kind: JointKind::Prismatic, axis, origin: Point::origin() };
                 AxisCandidate::new(joint, AxisSource::Manhattan)
             }));
-            (trajectory, candidates, if *kind == 0 { 2.0 } else { -2.0 })
+            (trajectory, candidates, if *kind == 0 { JointKind::Revolute } else { JointKind::Prismatic })
         })
         .collect();
     let config = config::Inference::default();
     stage(c, "score_axes", || {
-        for (trajectory, candidates, words) in &clips {
-            black_box(inference::paper::infer(black_box(trajectory), candidates, *words, None, &config));
+        for (trajectory, candidates, kind) in &clips {
+            black_box(inference::paper::infer(black_box(trajectory), candidates, Some(*kind), None, &config, 0));
         }
     });
 }

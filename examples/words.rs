@@ -13,10 +13,14 @@ use paws_twin::geometry::segments::Lsd;
 use paws_twin::pipeline;
 use paws_twin::reasoning::Reasoner;
 use paws_twin::reasoning::heuristic::Geometric;
-use paws_twin::reasoning::simulated::{Errors, Simulated};
 use paws_twin::recording::Recording;
 use paws_twin::report::files::predictions;
 use paws_twin::synth::{Options, Recorded, Tier};
+
+#[path = "../tests/it/simulated.rs"]
+mod simulated;
+
+use simulated::{Errors, Simulated};
 
 type Failure = Box<dyn std::error::Error>;
 

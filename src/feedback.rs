@@ -238,12 +238,13 @@ fn rechosen(joint: &SceneJoint, against: &[Option<Refutation>], config: &Config)
     let unlisted = if chosen == 0 {
         let listed: f64 = joint.hypotheses.iter().filter(|h| h.joint.kind == answer.joint.kind).map(|h| h.share).sum();
         let beside = (joint.hypotheses[0].type_share - listed).max(0.0);
-        (joint.joint_probability - right(&joint.hypotheses)).clamp(0.0, beside)
+        joint.joint_probability.map_or(0.0, |p| (p - right(&joint.hypotheses)).clamp(0.0, beside))
     } else {
         0.0
     };
-    let joint_probability = (right(&hypotheses) + unlisted / left(&joint.hypotheses, &nats)).min(answer.type_share);
-    SceneJoint { type_probability: answer.type_share, joint_probability, hypotheses, ..joint.under(&answer) }
+    let joint_probability = right(&hypotheses) + unlisted / left(&joint.hypotheses, &nats);
+    let joint_probability = Some(joint_probability.min(answer.type_share));
+    SceneJoint { type_probability: Some(answer.type_share), joint_probability, hypotheses, ..joint.under(&answer) }
 }
 
 /// Share that hypotheses of which `of` holds lose with their nats.
@@ -311,8 +312,8 @@ mod tests {
             clips: vec!["a".to_owned()],
             told: vec![],
             furniture: None,
-            type_probability: 0.6,
-            joint_probability: 0.6,
+            type_probability: Some(0.6),
+            joint_probability: Some(0.6),
             uncertainty: None,
             grip: GRIP,
             face: Some(Face {
@@ -341,8 +342,8 @@ mod tests {
             joint: slide,
             clips: vec![],
             told: vec![],
-            type_probability: 0.9,
-            joint_probability: 0.9,
+            type_probability: Some(0.9),
+            joint_probability: Some(0.9),
             grip: Point::new(0.165, -0.53, 0.8),
             face: Some(Face {
                 center: slide.origin,
@@ -416,9 +417,8 @@ mod tests {
 
     #[test]
     fn a_refuted_hypothesis_loses_its_nats_and_nothing_else_changes_hands() {
-        let config = Config::default();
+        let (config, joint) = (Config::default(), doubtful());
         let odds = |h: &[Hypothesis]| (h[0].share / h[1].share).ln();
-        let joint = doubtful();
         let after = rechosen(&joint, &[None, refuted(0.5)], &config);
         assert!((odds(&after.hypotheses) - odds(&joint.hypotheses) - 1.5).abs() < 1e-12);
         // Of what was not asked about half a hundredth is of each type.
@@ -426,8 +426,8 @@ mod tests {
         assert!((drawer.type_share + door.type_share - 1.0).abs() < 1e-12);
         assert!(((drawer.type_share - drawer.share) / drawer.share - 0.005 / 0.6).abs() < 1e-12);
         assert_eq!((after.joint, door.refuted.as_deref()), (DRAWER, Some("so")));
-        assert_eq!(after.type_probability, drawer.type_share);
-        assert!(after.type_probability > 0.6 && after.joint_probability < after.type_probability);
+        assert_eq!(after.type_probability, Some(drawer.type_share));
+        assert!(drawer.type_share > 0.6 && after.joint_probability.unwrap() < drawer.type_share);
     }
 
     #[test]
@@ -437,10 +437,10 @@ mod tests {
         joint.hypotheses[0].share = 0.45;
         let beside = Articulation { origin: DRAWER.origin + Vector::new(0.15, 0.0, 0.0), ..DRAWER };
         joint.hypotheses.push(hypothesis(beside, 0.1, 0.605, 0.445));
-        joint.joint_probability = 0.58;
+        joint.joint_probability = Some(0.58);
         let after = rechosen(&joint, &[None, refuted(1.0), None], &config);
         let left = 1.0 + 0.39 * (-config.validation.refuted_nats).exp_m1();
-        assert!(after.joint == DRAWER && (after.joint_probability - 0.58 / left).abs() < 1e-12, "{after:?}");
+        assert!(after.joint == DRAWER && (after.joint_probability.unwrap() - 0.58 / left).abs() < 1e-12, "{after:?}");
     }
 
     #[test]
@@ -450,11 +450,11 @@ mod tests {
         joint.hypotheses[0].share = 0.3;
         let beside = Articulation { axis: Vector::z(), ..DRAWER };
         joint.hypotheses.push(hypothesis(beside, 0.3, 0.605, 0.445));
-        joint.joint_probability = 0.6;
+        joint.joint_probability = Some(0.6);
         let after = rechosen(&joint, &[None, refuted(1.0), refuted(1.0)], &config);
         let share = after.hypotheses[0].share;
-        assert!(after.joint == DRAWER && after.joint_probability >= share, "{after:?}");
-        assert!(after.joint_probability <= after.type_probability && after.type_probability <= 1.0, "{after:?}");
+        assert!(after.joint == DRAWER && after.joint_probability >= Some(share), "{after:?}");
+        assert!(after.joint_probability <= after.type_probability && after.type_probability <= Some(1.0), "{after:?}");
     }
 
     #[test]
@@ -481,7 +481,7 @@ mod tests {
         let why = joints[0].hypotheses.iter().find_map(|h| h.refuted.clone()).unwrap_or_default();
         assert_eq!(joints[0].joint, DOOR, "{why}");
         assert!(why.contains("runs into joint_1_"), "{why}");
-        assert!(joints[0].hypotheses[0].refuted.is_none() && joints[0].type_probability > 0.5);
+        assert!(joints[0].hypotheses[0].refuted.is_none() && joints[0].type_probability > Some(0.5));
         assert_eq!(text(&joints[1..]), text(&scene.joints[1..]));
     }
 

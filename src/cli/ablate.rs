@@ -20,7 +20,7 @@ use crate::report::table::aligned;
 use crate::vlm::Usage;
 
 /// The configurations that are compared where none are named.
-const BUILT_IN: [(&str, &str); 19] = [
+const BUILT_IN: [(&str, &str); 22] = [
     ("ours", include_str!("../../examples/ablations/ours.toml")),
     ("ours_clustered_room", include_str!("../../examples/ablations/ours_clustered_room.toml")),
     ("ours_no_closed_state", include_str!("../../examples/ablations/ours_no_closed_state.toml")),
@@ -29,6 +29,7 @@ const BUILT_IN: [(&str, &str); 19] = [
     ("ours_no_feedback", include_str!("../../examples/ablations/ours_no_feedback.toml")),
     ("ours_no_hand_filter", include_str!("../../examples/ablations/ours_no_hand_filter.toml")),
     ("ours_no_merge", include_str!("../../examples/ablations/ours_no_merge.toml")),
+    ("ours_no_names", include_str!("../../examples/ablations/ours_no_names.toml")),
     ("ours_no_occlusion", include_str!("../../examples/ablations/ours_no_occlusion.toml")),
     ("ours_no_second_look", include_str!("../../examples/ablations/ours_no_second_look.toml")),
     ("ours_paper_rule", include_str!("../../examples/ablations/ours_paper_rule.toml")),
@@ -39,6 +40,8 @@ const BUILT_IN: [(&str, &str); 19] = [
     ("paper_few_views", include_str!("../../examples/ablations/paper_few_views.toml")),
     ("paper_gravity_room", include_str!("../../examples/ablations/paper_gravity_room.toml")),
     ("paper_no_hand_filter", include_str!("../../examples/ablations/paper_no_hand_filter.toml")),
+    ("paper_s", include_str!("../../examples/ablations/paper_s.toml")),
+    ("paper_s_places", include_str!("../../examples/ablations/paper_s_places.toml")),
     ("paper_triangulated_lines", include_str!("../../examples/ablations/paper_triangulated_lines.toml")),
 ];
 
@@ -202,7 +205,9 @@ mod tests {
         let all = built_in().unwrap();
         assert_eq!(all, of_folder(&dir).unwrap());
         assert_eq!(all[0], ("ours".to_owned(), Config::default()));
-        assert!(all.iter().any(|(name, config)| name == "paper" && *config == Config::paper()));
+        for (name, expected) in [("paper", Config::paper()), ("paper_s", Config::paper_s())] {
+            assert!(all.iter().any(|(n, config)| n == name && *config == expected), "{name}");
+        }
         for (i, (name, config)) in all.iter().enumerate() {
             assert!(all[..i].iter().all(|(_, earlier)| earlier != config), "{name} is another one under a new name");
             let base = if name.starts_with("paper") { Config::paper() } else { Config::default() };

@@ -78,7 +78,8 @@ enum Command {
 /// Arguments of all commands that run steps of the pipeline.
 #[derive(Debug, Clone, Default, Args)]
 pub struct ConfigFile {
-    /// Parameters to change, as TOML (`paws config --toml` prints all of them), or the word `paper`: the paper to the letter
+    /// Parameters to change, as TOML (`paws config --toml` prints all of them), or a word: `paper` is the paper's PAWS, every
+    /// clip for itself, `paper_s` its PAWS-s, clips of one part together
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
 }
@@ -88,6 +89,7 @@ impl ConfigFile {
         match self.config.as_deref() {
             None => Ok(Config::default()),
             Some(word) if word == Path::new("paper") && !word.exists() => Ok(Config::paper()),
+            Some(word) if word == Path::new("paper_s") && !word.exists() => Ok(Config::paper_s()),
             Some(file) => Config::read(file),
         }
     }

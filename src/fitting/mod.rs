@@ -64,7 +64,11 @@ pub fn fit_joints(scene: &Scene, joints: &[SceneJoint], up: &Vector, config: &co
     }
     // What is surer stands; what is less sure gives way.
     let mut order: Vec<usize> = (0..plans.len()).collect();
-    let sureness = |i: usize| plans[i].joint.type_probability * (plans[i].joint.clips.len() as f64).min(3.0);
+    // Where nobody computed how sure the types are, the clips alone count.
+    let sureness = |i: usize| {
+        let joint = plans[i].joint;
+        joint.type_probability.unwrap_or(1.0) * (joint.clips.len() as f64).min(3.0)
+    };
     order.sort_by(|&a, &b| sureness(b).total_cmp(&sureness(a)).then(a.cmp(&b)));
     let mut placed: Vec<(usize, Furniture)> = Vec::new();
     let mut left_out = Vec::new();
@@ -433,8 +437,8 @@ mod tests {
             joint,
             clips: vec![],
             furniture: None,
-            type_probability: 1.0,
-            joint_probability: 1.0,
+            type_probability: Some(1.0),
+            joint_probability: Some(1.0),
             told: Vec::new(),
             uncertainty: None,
             grip: Point::new(0.2, -0.035, 0.8),

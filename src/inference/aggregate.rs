@@ -1,8 +1,8 @@
 //! Clips of one joint found and merged into one scene-level joint (§3.4, §C.2).
 
-use super::mean_direction;
+use super::{mean_direction, paper};
 use crate::articulation::{Action, Articulation, JointKind};
-use crate::config;
+use crate::config::{self, GroupingMethod};
 use crate::geometry::Face;
 use crate::geometry::Rect;
 use crate::math::{Point, Vector, signed_angle, unsigned_angle};
@@ -28,6 +28,8 @@ pub struct Held<'a> {
     pub part: Option<(Face, Rect)>,
     /// The clip's own joint, where there is one.
     pub joint: Option<Articulation>,
+    /// Confident voxels of the touched furniture, sorted; none where it was not found.
+    pub voxels: &'a [[i32; 3]],
 }
 
 /// A clip that moves something, in which no hand was followed.
@@ -42,15 +44,18 @@ pub struct Missed<'a> {
 /// Groups clips that show one part, given in the order of time. Returns indices into `clips`.
 ///
 /// Two clips belong together if the grip was at the same place of the same face when closed; or if one closes what the other
-/// left open: people take hold of a part where they left it, and what is closed was open.
+/// left open: people take hold of a part where they left it, and what is closed was open. The paper's grouping asks for their
+/// voxels instead ([`paper::same_voxels`]).
 #[must_use]
 pub fn group(clips: &[Held], missed: &[Missed], config: &config::Inference) -> Vec<Vec<usize>> {
+    if !config.merge_clips {
+        return (0..clips.len()).map(|i| vec![i]).collect();
+    }
+    if config.grouping == GroupingMethod::Voxels {
+        return paper::same_voxels(&clips.iter().map(|c| c.voxels).collect::<Vec<_>>(), config);
+    }
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (i, clip) in clips.iter().enumerate() {
-        if !config.merge_clips {
-            groups.push(vec![i]);
-            continue;
-        }
         let continues = |g: &Vec<usize>| g.last() == Some(&i.wrapping_sub(1)) && closes(&clips[i - 1], clip, config);
         let distance =
             |g: &Vec<usize>| g.iter().map(|&j| (clips[j].closed - clip.closed).norm()).fold(f64::INFINITY, f64::min);
@@ -210,11 +215,11 @@ pub struct Front {
 /// with those that join it, in order.
 #[must_use]
 pub fn same_fronts(fronts: &[Option<Front>], config: &config::Inference) -> Vec<Vec<usize>> {
+    // The paper's grouping knows no fronts.
+    let asked = config.merge_clips && config.grouping == GroupingMethod::Places;
     let mut sets: Vec<Vec<usize>> = Vec::new();
     for (i, front) in fronts.iter().enumerate() {
-        let meets = |&j: &usize| {
-            front.zip(fronts[j]).is_some_and(|(a, b)| config.merge_clips && cover_one_place(&a, &b, config))
-        };
+        let meets = |&j: &usize| front.zip(fronts[j]).is_some_and(|(a, b)| asked && cover_one_place(&a, &b, config));
         let (mut joined, apart): (Vec<Vec<usize>>, _) = sets.into_iter().partition(|set| set.iter().any(meets));
         joined.push(vec![i]);
         let mut set = joined.concat();
@@ -310,7 +315,18 @@ mod tests {
     fn held(action: Action, closed: [f64; 3], open: [f64; 3]) -> Held<'static> {
         let (closed, open) = (Point::from(closed), Point::from(open));
         let normal = Some(Vector::y());
-        Held { action, closed, open, normal, path: &[], furniture: None, kind: None, part: None, joint: None }
+        Held {
+            action,
+            closed,
+            open,
+            normal,
+            path: &[],
+            furniture: None,
+            kind: None,
+            part: None,
+            joint: None,
+            voxels: &[],
+        }
     }
 
     #[test]
@@ -322,6 +338,20 @@ mod tests {
             held(Action::Close, [0.0, 0.02, 0.69], [0.0, 0.4, 0.7]),
         ];
         assert_eq!(group(&clips, &[], &config::Inference::default()), [vec![0, 3], vec![1, 2]]);
+    }
+
+    #[test]
+    fn the_papers_grouping_asks_for_voxels_and_for_nothing_else() {
+        let rows: [Vec<[i32; 3]>; 3] = [0..9, 20..29, 1..9].map(|xs| xs.map(|x| [x, 0, 0]).collect());
+        let [here, far, again] = &rows;
+        // One grip when closed, which tells them to be one part.
+        let clip = |voxels| Held { voxels, ..held(Action::Open, [0.0, 0.0, 0.7], [0.0, 0.4, 0.7]) };
+        let clips = [here, far, again].map(|row| clip(row.as_slice()));
+        let with = |grouping| config::Inference { grouping, ..Default::default() };
+        assert_eq!(group(&clips, &[], &with(GroupingMethod::Places)), [vec![0, 1, 2]]);
+        assert_eq!(group(&clips, &[], &with(GroupingMethod::Voxels)), [vec![0, 2], vec![1]]);
+        let apart = config::Inference { merge_clips: false, ..with(GroupingMethod::Voxels) };
+        assert_eq!(group(&clips, &[], &apart).len(), 3);
     }
 
     #[test]

@@ -25,11 +25,11 @@ pub struct ClipJoint {
     pub contact_pivot: Point,
     /// Where the axis comes from.
     pub source: AxisSource,
-    /// Probability of the type.
-    pub type_probability: f64,
+    /// Probability of the type; `None` where nobody computed one, as under the paper's rule.
+    pub type_probability: Option<f64>,
     /// Probability that type, axis and hinge are right, see [`is_right`]: of the weight of all explanations the share under
-    /// which they are.
-    pub joint_probability: f64,
+    /// which they are; `None` as above.
+    pub joint_probability: Option<f64>,
     /// Root mean square distance of the smoothed hand from the joint's path, metres.
     pub residual_m: f64,
     /// Share of hand samples within the torus (§B.1) or the slide's tolerance.
@@ -120,8 +120,8 @@ pub fn infer(
         joint,
         contact_pivot,
         source: best.source,
-        type_probability,
-        joint_probability: type_probability * agreeing_share(&best.joint, &all),
+        type_probability: Some(type_probability),
+        joint_probability: Some(type_probability * agreeing_share(&best.joint, &all)),
         residual_m: residual,
         inliers,
         radius_m,
@@ -224,13 +224,13 @@ pub fn agreeing_share(best: &Articulation, all: &[(Articulation, f64)]) -> f64 {
     if total > 0.0 { agreeing / total } else { 0.0 }
 }
 
-/// Whether an answer is right if `truth` is the joint, by the paper's limits (§4) as [`crate::evaluation::Rule::PawsLine`] reads
+/// Whether an answer is right if `other` is the joint, by the paper's limits (§4) as [`crate::evaluation::Rule::PawsLine`] reads
 /// them: of its type, directions within 15 degrees, the true hinge within 25 cm of the answer's line.
 #[must_use]
-pub fn is_right(answer: &Articulation, truth: &Articulation) -> bool {
+pub fn is_right(answer: &Articulation, other: &Articulation) -> bool {
     const ANGLE_DEG: f64 = 15.0;
     const HINGE_M: f64 = 0.25;
-    answer.kind == truth.kind && near(answer, truth, ANGLE_DEG, HINGE_M)
+    answer.kind == other.kind && near(answer, other, ANGLE_DEG, HINGE_M)
 }
 
 /// Whether two joints are one explanation: hand and depth seldom tell joints apart that are within 8 degrees and 8 cm.

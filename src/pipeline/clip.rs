@@ -186,7 +186,8 @@ pub(super) fn infer(
     let face = result.face.as_ref();
     result.joint = match config.inference.method {
         InferenceMethod::Paper => {
-            inference::paper::infer(trajectory, &result.candidates, answer.words_log_odds, face, &config.inference)
+            let told = inference::paper::told(result.words.as_ref(), &located.reading);
+            inference::paper::infer(trajectory, &result.candidates, told, face, &config.inference, config.seed)
         }
         InferenceMethod::Posterior => inference::infer(
             trajectory,

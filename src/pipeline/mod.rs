@@ -24,6 +24,7 @@ use crate::localization::{Footage, Region, views};
 use crate::math::Point;
 use crate::reasoning::words::Words;
 use crate::reasoning::{Answer, Reasoner};
+use crate::recording::narration;
 use crate::recording::sketch::Sketch;
 use crate::recording::{AtWork, Clip, DepthFactors, Recording};
 pub use room::{RoomCell, RoomCells};
@@ -93,11 +94,13 @@ pub struct SceneJoint {
     pub told: Vec<Told>,
     /// The word that people used for the furniture.
     pub furniture: Option<String>,
-    /// Probability of the type.
-    pub type_probability: f64,
+    /// Probability of the type; `None` where nobody computed one.
+    #[serde(default)]
+    pub type_probability: Option<f64>,
     /// Probability that type, axis (15 degrees) and hinge (25 cm) are right, see [`crate::inference::is_right`]. How likely just
-    /// this joint is, is the share of the first of `hypotheses`.
-    pub joint_probability: f64,
+    /// this joint is, is the share of the first of `hypotheses`. `None` where nobody computed one.
+    #[serde(default)]
+    pub joint_probability: Option<f64>,
     /// How sure axis, hinge and openings are; `None` for joints that nobody was seen to move.
     #[serde(default)]
     pub uncertainty: Option<Uncertainty>,
@@ -112,7 +115,7 @@ pub struct SceneJoint {
     /// Opening that each of `clips` went through, rad or m.
     pub moved: Vec<f64>,
     /// How the part could move, its own joint first; one alone where nothing else had a hundredth of all weight before
-    /// physics was asked, or where it is not to be asked (`validation.feedback`).
+    /// physics was asked, or where it is not to be asked (`validation.feedback`); none where nobody computed shares.
     #[serde(default)]
     pub hypotheses: Vec<Hypothesis>,
 }
@@ -215,6 +218,9 @@ pub fn infer(
     progress: Progress,
 ) -> Result<Scene> {
     check_depth(recording)?;
+    // The one place where names are taken away: whatever reads them later reads these clips.
+    let unnamed = (!config.reasoning.use_names).then(|| narration::without_names(recording));
+    let recording = unnamed.as_ref().unwrap_or(recording);
     let counter = std::sync::atomic::AtomicUsize::new(0);
     let start = |step: &str, total: usize| {
         counter.store(0, std::sync::atomic::Ordering::Relaxed);

@@ -7,7 +7,7 @@ use super::closed::{Grip, by_trust};
 use super::refit;
 use super::{ClipResult, Hypothesis, SceneJoint, told};
 use crate::articulation::{Articulation, JointKind};
-use crate::config::{Config, InferenceMethod};
+use crate::config::{Config, GroupingMethod, InferenceMethod};
 use crate::geometry::Rect;
 use crate::geometry::sights::{self, Sights};
 use crate::geometry::{AxisCandidate, AxisSource, Face, candidates, front, moved, outline};
@@ -18,8 +18,11 @@ use crate::math::Point;
 use crate::reasoning::{Answer, Question, Reasoner};
 use crate::recording::narration;
 
-/// Probability of its type above which a joint's hinge tells two parts apart.
-const SURE: f64 = 0.7;
+/// Whether a joint's hinge tells two parts apart: where its type is this sure, or nobody computed how sure it is.
+fn sure(type_probability: Option<f64>) -> bool {
+    const SURE: f64 = 0.7;
+    type_probability.is_none_or(|p| p > SURE)
+}
 
 /// Clips to scene-level joints (§C.2).
 pub(super) fn merge(
@@ -47,7 +50,8 @@ pub(super) fn merge(
             furniture: named.as_ref().and_then(|r| r.furniture.as_deref()),
             kind: named.as_ref().and_then(|r| r.kind),
             part: clip.face.zip(clip.part),
-            joint: clip.joint.found().filter(|j| j.type_probability > SURE).map(|j| j.joint),
+            joint: clip.joint.found().filter(|j| sure(j.type_probability)).map(|j| j.joint),
+            voxels: clip.region.as_ref().map_or_else(Default::default, |region| region.voxels.as_slice()),
         })
         .collect();
     let unseen = unseen(&seen, clips);
@@ -67,7 +71,8 @@ pub(super) fn merge(
     for (i, joint) in joints.iter_mut().enumerate() {
         joint.id = format!("joint_{i}");
     }
-    if config.inference.merge_clips {
+    // Clips without a hand have no voxels: the paper's grouping leaves them out.
+    if config.inference.merge_clips && config.inference.grouping == GroupingMethod::Places {
         told::tie(&mut joints, clips);
     }
     joints
@@ -99,9 +104,9 @@ fn regrouped(
     config: &Config,
 ) -> Vec<(Vec<usize>, SceneJoint)> {
     let front = |joint: &SceneJoint| {
-        let sure = Some(joint.joint).filter(|_| joint.type_probability > SURE);
+        let hung = Some(joint.joint).filter(|_| sure(joint.type_probability));
         let (face, rect) = joint.face.zip(joint.part)?;
-        Some(aggregate::Front { face, rect, grip: joint.grip, joint: sure })
+        Some(aggregate::Front { face, rect, grip: joint.grip, joint: hung })
     };
     loop {
         let fronts: Vec<Option<aggregate::Front>> = joints.iter().map(|(_, joint)| front(joint)).collect();
@@ -187,9 +192,9 @@ struct Judged {
     grip: Point,
     /// How the part could move, the answer first; never empty.
     likely: Vec<Likely>,
-    /// Of the answer.
-    type_probability: f64,
-    joint_probability: f64,
+    /// Of the answer; `None` where nobody computed them.
+    type_probability: Option<f64>,
+    joint_probability: Option<f64>,
 }
 
 /// One way in which a part could move; see [`inference::Explanation`].
@@ -281,7 +286,8 @@ fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
         part: answer.part,
         observed_range: answer.observed_range,
         moved: answer.moved,
-        hypotheses,
+        // Without a posterior there are no shares to tell.
+        hypotheses: if look.joint_probability.is_some() { hypotheses } else { Vec::new() },
     })
 }
 
@@ -302,12 +308,16 @@ fn judged(group: &Group, reasoner: &dyn Reasoner, outlines: &[Rect]) -> Option<J
     let (mut joint, mut type_probability) = (best_joint.joint, best_joint.type_probability);
     let mut joint_probability = best_joint.joint_probability;
     let mut all_likely = Vec::new();
+    // The clip whose answer the joint is built on.
+    let mut speaker = best;
     let judged_before = members.len() == 1 && outlines.is_empty();
     if members.len() > 1 && config.inference.method == InferenceMethod::Paper {
-        // The clips' own joints, one voice each.
-        let all: Vec<(Articulation, f64)> =
-            members.iter().filter_map(|&c| clips[c].joint.found()).map(|j| (j.joint, 1.0)).collect();
-        joint = aggregate::consensus(&joint, &all);
+        let (speakers, own): (Vec<usize>, Vec<&inference::ClipJoint>) =
+            members.iter().filter_map(|&c| Some((c, clips[c].joint.found()?))).unzip();
+        let paths: Vec<Vec<Point>> = group.shown().iter().map(|(_, hand)| hand.positions()).collect();
+        if let Some((winner, merged)) = inference::paper::together(&own, &paths, &config.inference) {
+            (speaker, joint) = (speakers[winner], merged);
+        }
     } else if !judged_before {
         let paths: Vec<Vec<Point>> =
             members.iter().filter_map(|&c| clips[c].trajectory.as_ref()).map(Trajectory::positions).collect();
@@ -374,8 +384,9 @@ fn judged(group: &Group, reasoner: &dyn Reasoner, outlines: &[Rect]) -> Option<J
             let all: Vec<(Articulation, f64)> =
                 pooled.iter().zip(&weights).map(|(k, w)| (k.joint, (w - weights[top]).exp())).collect();
             joint = aggregate::consensus(&pooled[top].joint, &all);
-            type_probability = revolute_probability.max(1.0 - revolute_probability);
-            joint_probability = type_probability * inference::agreeing_share(&pooled[top].joint, &all);
+            let of_type = revolute_probability.max(1.0 - revolute_probability);
+            type_probability = Some(of_type);
+            joint_probability = Some(of_type * inference::agreeing_share(&pooled[top].joint, &all));
             all_likely = likely(&pooled, &answer, true);
         }
     } else if let (InferenceMethod::Posterior, Some(answer)) = (config.inference.method, &clips[best].answer) {
@@ -384,8 +395,11 @@ fn judged(group: &Group, reasoner: &dyn Reasoner, outlines: &[Rect]) -> Option<J
     match all_likely.first_mut() {
         Some(answer) => answer.joint = joint,
         None => {
-            let chosen = uncertainty::chosen(best_joint, &clips[best].candidates);
-            all_likely.push(Likely { joint, chosen, share: joint_probability, type_share: 1.0 });
+            let own = clips[speaker].joint.found().unwrap_or(best_joint);
+            let chosen = uncertainty::chosen(own, &clips[speaker].candidates);
+            // The only one; where nobody computed a share, none is told.
+            let [share, type_share] = [joint_probability, type_probability].map(|p| p.unwrap_or(1.0));
+            all_likely.push(Likely { joint, chosen, share, type_share });
         }
     }
     Some(Judged { best, grip, likely: all_likely, type_probability, joint_probability })

@@ -8,7 +8,6 @@ pub mod answers;
 pub mod heuristic;
 pub mod marks;
 pub mod prompts;
-pub mod simulated;
 pub mod words;
 
 use serde::{Deserialize, Serialize};

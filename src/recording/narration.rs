@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use serde::{Deserialize, Serialize};
 
-use super::Clip;
+use super::{Clip, Recording};
 use crate::articulation::{Action, JointKind};
 
 /// The lexicon, parsed once.
@@ -149,6 +149,29 @@ pub fn read(clip: &Clip) -> Reading {
         kind,
         generic: generic.is_some(),
     }
+}
+
+/// The recording as if people had called all furniture "it", and masks had no names: of what a clip says, its motion stays. Clips
+/// that move nothing keep their words, which only say so.
+#[must_use]
+pub fn without_names(recording: &Recording) -> Recording {
+    let clips = recording.clips.iter().map(unnamed).collect();
+    Recording { clips, labels: Default::default(), ..recording.clone() }
+}
+
+fn unnamed(clip: &Clip) -> Clip {
+    let reading = read(clip);
+    if reading.moves_joint == Some(false) {
+        return clip.clone();
+    }
+    let (verb, noun) = match reading.action {
+        Some(Action::Open) => ("open", "it"),
+        Some(Action::Close) => ("close", "it"),
+        // A verb that tells no way may tell the type ("slide", "swing").
+        None => ("", ""),
+    };
+    let narration = format!("{verb} {noun}").trim().to_owned();
+    Clip { narration, verb: verb.to_owned(), noun: noun.to_owned(), ..clip.clone() }
 }
 
 /// How far the next word of a verb's phrase may stand: "pull the fridge door right open".
@@ -300,6 +323,29 @@ mod tests {
             assert_eq!((r.moves_joint, r.action, r.kind), (Some(moves), action, kind), "{text}");
         }
         assert_eq!(reading("").moves_joint, None);
+    }
+
+    #[test]
+    fn without_names_the_motion_is_all_that_a_narration_tells() {
+        for (text, verb, noun) in [
+            ("open the fridge", "open", "fridge"),
+            ("push the drawer back in", "push", "drawer"),
+            ("lift the lid of the chest", "lift", "lid"),
+            ("pull the door shut", "", ""),
+            ("", "close", "oven"),
+            ("shut it", "shut", "it"),
+            ("slide the drawer", "slide", "drawer"),
+        ] {
+            let [narration, verb, noun] = [text, verb, noun].map(str::to_owned);
+            let clip = Clip { clip: "c".to_owned(), start_frame: 3, end_frame: 9, narration, verb, noun };
+            let (before, after) = (read(&clip), read(&unnamed(&clip)));
+            assert_eq!((after.action, after.furniture, after.kind), (before.action, None, None), "{text}");
+            assert_eq!(after.moves_joint, before.action.map(|_| true), "{text}");
+            assert_eq!((unnamed(&clip).start_frame, unnamed(&clip).end_frame), (3, 9));
+        }
+        let [clip, verb, noun] = [(); 3].map(|()| String::new());
+        let washing = Clip { clip, start_frame: 0, end_frame: 1, narration: "wash hands".to_owned(), verb, noun };
+        assert_eq!(unnamed(&washing), washing);
     }
 
     #[test]

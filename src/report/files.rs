@@ -19,7 +19,8 @@ struct JointEntry<'a> {
     furniture: Option<&'a str>,
     #[serde(flatten)]
     joint: Articulation,
-    type_probability: f64,
+    /// `null` where nobody computed one.
+    type_probability: Option<f64>,
     observed_range: f64,
     grip: Point,
     clips: &'a [String],
@@ -177,8 +178,8 @@ pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
             // The joint's other clips have rows of their own.
             row.uncertainty = said.map(|u| Uncertainty { moved_std: Vec::new(), ..u.clone().about(&phi.axis) });
             row.part_box = part.map(|p| p.bounds);
-            row.confidence = Some(joint.type_probability);
-            row.joint_confidence = Some(joint.joint_probability);
+            row.confidence = joint.type_probability;
+            row.joint_confidence = joint.joint_probability;
             row.joint = Some(joint.id.clone());
             row.refuted = words::refuted(joint);
             row
@@ -210,8 +211,8 @@ mod tests {
             clips: vec!["other".to_owned(), "seen".to_owned()],
             told: vec![Told { clip: "told".to_owned(), with: "seen".to_owned() }],
             furniture: None,
-            type_probability: 0.9,
-            joint_probability: 0.8,
+            type_probability: Some(0.9),
+            joint_probability: Some(0.8),
             uncertainty: None,
             grip: Point::origin(),
             face: None,

@@ -72,7 +72,7 @@ pub fn render(
                 kind: f.part.joint.articulation.kind.word(),
                 axis: words::axis(&f.part, joint.and_then(|j| j.face.as_ref())),
                 range: words::amount(f.part.joint.articulation.kind, f.part.joint.upper),
-                sure: joint.map_or(String::new(), |j| words::sure(j.type_probability)),
+                sure: joint.and_then(|j| j.type_probability).map_or("-".to_owned(), words::sure),
                 tracking: words::centimetres(check.rms_m),
                 force: format!("{:.0} N", check.peak_force_n),
                 verdict: check.verdict.word(),

@@ -111,9 +111,9 @@ pub fn clip_reason(clip: &ClipResult, joint: Option<&SceneJoint>) -> String {
         }
         (Outcome::Abstained(reason), None) => reason.clone(),
         (Outcome::Found(j), _) => format!(
-            "{} ({} sure), axis from {}, moved {}, hand within {} of its path",
+            "{}{}, axis from {}, moved {}, hand within {} of its path",
             j.joint.kind.word(),
-            sure(j.type_probability),
+            j.type_probability.map_or(String::new(), |p| format!(" ({} sure)", sure(p))),
             source(j.source),
             amount(j.joint.kind, j.observed_range),
             centimetres(j.residual_m)

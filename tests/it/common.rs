@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::sync::LazyLock;
+use std::sync::{LazyLock, Mutex};
 
 use paws_twin::config::Config;
 use paws_twin::fitting;
@@ -14,6 +14,8 @@ use paws_twin::recording::Recording;
 use paws_twin::synth::{Options, Recorded, Tier};
 use paws_twin::twin::Twin;
 use tempfile::TempDir;
+
+use crate::skips;
 
 /// A small clean recording that tests copy and break; rendered once.
 pub static SMALL: LazyLock<TempDir> = LazyLock::new(|| {
@@ -92,22 +94,53 @@ pub fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// Optional data beside the project (`PAWS_DATA`, else `../shared/data`): tests that use it say so when they skip.
+/// Optional data beside the project (`PAWS_DATA`, else `../shared/data`). Without that folder a test that uses it is skipped,
+/// which is counted; a folder that is there and lacks it is a failure.
 pub fn optional_data(name: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("PAWS_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
-    let path = root.join(name);
-    if path.exists() {
-        return Some(path);
+    let named = std::env::var_os("PAWS_DATA").filter(|v| !v.is_empty());
+    let root =
+        named.as_ref().map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
+    match data_at(&root, named.is_some(), name) {
+        Ok(Some(path)) => Some(path),
+        Ok(None) => {
+            skipped(&format!("there is no {} for \"{name}\" (set PAWS_DATA to a folder that has it)", root.display()));
+            None
+        }
+        Err(missing) => panic!("{missing}"),
     }
-    skipped(&format!("{} is not there (set PAWS_DATA to a folder that has it)", path.display()));
-    None
 }
 
-/// Says that a check was skipped, past the capture of passing tests.
+/// Data in a folder; `None` where there is no such folder and nobody `named` it, an error where it lacks the data.
+pub fn data_at(root: &Path, named: bool, name: &str) -> Result<Option<PathBuf>, String> {
+    let path = root.join(name);
+    match path.exists() {
+        true => Ok(Some(path)),
+        false if named || root.is_dir() => {
+            Err(format!("{} is not there, but its folder is to be used", path.display()))
+        }
+        false => Ok(None),
+    }
+}
+
+/// The list of this run, empty at first.
+static SKIPS: LazyLock<Mutex<()>> = LazyLock::new(|| {
+    std::fs::write(skips::list(), skips::begun(&skips::run())).unwrap();
+    Mutex::new(())
+});
+
+/// Begins the list of what was skipped, once: what an earlier run has left is gone.
+pub fn begin_skips() {
+    LazyLock::force(&SKIPS);
+}
+
+/// Says that a check was skipped, past the capture of passing tests, and puts it on the list.
 pub fn skipped(why: &str) {
     use std::io::Write;
-    let _ = writeln!(std::io::stderr(), "skipped: {why}");
+    let line = why.split_whitespace().collect::<Vec<_>>().join(" ");
+    let _ = writeln!(std::io::stderr(), "skipped: {line}");
+    let _one_at_a_time = SKIPS.lock().unwrap();
+    let mut list = std::fs::OpenOptions::new().append(true).open(skips::list()).unwrap();
+    writeln!(list, "{line}").unwrap();
 }
 
 /// Whether a check that cannot run is a failure.

@@ -18,7 +18,6 @@ use paws_twin::pipeline;
 use paws_twin::reasoning::Reasoner;
 use paws_twin::reasoning::heuristic::Geometric;
 use paws_twin::reasoning::prompts::Prompts;
-use paws_twin::reasoning::simulated::{Errors, Simulated};
 use paws_twin::reasoning::words::Asking;
 use paws_twin::recording::Recording;
 use paws_twin::report::files::predictions;
@@ -29,6 +28,7 @@ use serde_json::{Value, json};
 use tempfile::TempDir;
 
 use crate::common::{SMALL, copy, python, record, stderr, tree};
+use crate::simulated::{Errors, Simulated};
 
 /// A request as the server got it.
 struct Got {

@@ -1,18 +1,18 @@
-//! A language model that knows the truth and errs as often as it is told to: for tests and tables of accuracy. The pipeline
-//! and the commands never make one.
+//! A language model that knows the truth and errs as often as it is told to: for tests and tables of accuracy. It is no part of
+//! the library, whose inference knows no truth.
 
 use std::collections::BTreeMap;
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-use super::heuristic::Geometric;
-use super::words::{LineVote, Sight, Words};
-use super::{Answer, Question, Reasoner};
-use crate::articulation::{Articulation, JointKind};
-use crate::error::Result;
-use crate::geometry::LineTrack;
-use crate::math::unsigned_angle;
+use paws_twin::articulation::{Articulation, JointKind};
+use paws_twin::error::Result;
+use paws_twin::geometry::LineTrack;
+use paws_twin::math::unsigned_angle;
+use paws_twin::reasoning::heuristic::Geometric;
+use paws_twin::reasoning::words::{LineVote, Sight, Words};
+use paws_twin::reasoning::{Answer, Question, Reasoner};
 
 /// How a simulated model errs.
 #[derive(Debug, Clone, Copy, PartialEq)]
