@@ -2,12 +2,14 @@
 //!
 //! The layout on disk is described in `docs/recording-format.md`.
 
+mod columns;
 pub mod grid;
 pub mod images;
 pub mod narration;
 mod read;
 pub mod segments;
 pub mod sketch;
+mod sniff;
 pub mod trajectory;
 
 use std::collections::BTreeMap;
