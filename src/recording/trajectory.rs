@@ -104,7 +104,11 @@ impl<'a> Table<'a> {
             },
         };
         if text.is_empty() {
-            if !comment.is_empty() && self.layout.is_none() && self.titles.len() < MAX_TITLES {
+            if !comment.is_empty() && self.layout.is_none() {
+                // Of a long preamble only its end can be a header.
+                if self.titles.len() >= MAX_TITLES {
+                    self.titles.retain(|(.., is_comment)| !is_comment);
+                }
                 self.titles.push((number, comment.to_owned(), true));
             }
             return Ok(());
@@ -119,7 +123,8 @@ impl<'a> Table<'a> {
         }
         // A title or a header stands above the numbers and has none in it.
         let is_title = cells.iter().all(|c| c.parse::<f64>().is_err());
-        if is_title && self.layout.is_none() && self.titles.len() < MAX_TITLES {
+        let titles = self.titles.iter().filter(|(.., is_comment)| !is_comment).count();
+        if is_title && self.layout.is_none() && titles < MAX_TITLES {
             self.titles.push((number, text.to_owned(), false));
             return Ok(());
         }
