@@ -29,13 +29,16 @@ pub struct ValidateArgs {
 
 pub fn run(args: &ValidateArgs) -> anyhow::Result<Answer> {
     let config = args.config.read()?;
-    let (twin, in_order) = if foreign::is_model(&args.twin) {
-        foreign::load(&args.twin, &args.foreign)?
+    let (twin, rules, in_order) = if foreign::is_model(&args.twin) {
+        let foreign::Loaded { twin, rules, hands } = foreign::load(&args.twin, &args.foreign)?;
+        (twin, Some(rules), hands)
     } else {
         args.foreign.refuse()?;
-        ours(&args.twin)?
+        let (twin, hands) = ours(&args.twin)?;
+        (twin, None, hands)
     };
-    let report = validation::validate(&twin, &as_hands(&in_order), &Vector::z(), &config.validation)?;
+    let hands = as_hands(&in_order);
+    let report = validation::validate_ruled(&twin, rules.as_ref(), &hands, &Vector::z(), &config.validation)?;
     let header = [
         "joint",
         "clip",
