@@ -113,16 +113,25 @@ pub(super) fn progresses(points: &[Point]) -> bool {
 
 /// The opening that a path goes through, rad or m. `beside_m` is what lies beside the joint's path (root mean square).
 ///
-/// All of the path counts. Of a hundred samples one may be wrong at each end; of fewer none. Noise makes the extreme samples
-/// of many go too far: each end is the mean of the samples that are within two standard deviations of it.
+/// All of the path counts. Of a hundred samples one is given up at an end where it stands apart from the others, or where the
+/// samples jump about by more than the motion goes from one to the next. Noise makes the extreme of many samples go too far:
+/// each end is the mean of the samples that are within two of its standard deviations.
 pub(super) fn range(joint: &Articulation, openings: &[f64], lever_m: f64, beside_m: f64) -> f64 {
     let lever = if joint.kind == JointKind::Revolute { lever_m.max(PLAY_M) } else { 1.0 };
     let noise = own_noise(openings).min(beside_m / std::f64::consts::SQRT_2 / lever);
     let mut sorted = openings.to_vec();
     sorted.sort_by(f64::total_cmp);
+    let ends = (0, sorted.len().saturating_sub(1));
     let wrong = sorted.len() / 100;
-    let kept = sorted.get(wrong..sorted.len() - wrong).unwrap_or_default();
-    let (Some(&low), Some(&high)) = (kept.first(), kept.last()) else { return 0.0 };
+    let steps: Vec<f64> = openings.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|s| *s > 0.0).collect();
+    let usual = stats::median(&steps).unwrap_or(0.0);
+    let at = |i: usize| sorted.get(i).copied().unwrap_or(0.0);
+    // The last of a smooth motion are about as far apart as all the others.
+    let given_up = |gap: f64| if 1.5 * noise > usual || gap > (wrong as f64 + 3.0) * usual { wrong } else { 0 };
+    let from = given_up(at(wrong) - at(ends.0));
+    let to = ends.1 - given_up(at(ends.1) - at(ends.1 - wrong));
+    let kept = sorted.get(from..=to).unwrap_or_default();
+    let (low, high) = (at(from), at(to));
     let mean = |inside: &dyn Fn(f64) -> bool| {
         stats::mean(&kept.iter().copied().filter(|x| inside(*x)).collect::<Vec<_>>()).unwrap_or(0.0)
     };

@@ -14,4 +14,5 @@ mod physics;
 mod real_recordings;
 mod same_bytes;
 mod simulators;
+mod trajectories;
 mod words;
