@@ -46,7 +46,7 @@ impl Straightened {
         if weight <= 0.0 {
             return None;
         }
-        let seen = bend.iter().zip(&self.beside).fold(Vector2::zeros(), |sum, (b, v)| sum + v * *b) / weight;
+        let seen = bend.iter().zip(&self.beside).fold(Vector2::<f64>::zeros(), |sum, (b, v)| sum + v * *b) / weight;
         let least = 0.5 / radius;
         let size = seen.norm();
         let taken = if size >= least {
@@ -64,7 +64,7 @@ impl Straightened {
 fn beside_circle(points: &[Point], hinge: &Articulation) -> Beside {
     let line = hinge.line();
     let places: Vec<Vector2<f64>> = points.iter().map(|p| Vector2::new(line.distance(p), line.coordinate(p))).collect();
-    let mean = places.iter().fold(Vector2::zeros(), |sum, p| sum + p) / places.len().max(1) as f64;
+    let mean = places.iter().fold(Vector2::<f64>::zeros(), |sum, p| sum + p) / places.len().max(1) as f64;
     places.iter().map(|p| p - mean).collect()
 }
 
