@@ -150,7 +150,7 @@ fn refutation(
             let drive =
                 Drive { times_secs: clip.times_secs.clone(), path: clip.path.clone(), grip: *grip, back: false };
             // What cannot be simulated says nothing about the kitchen, for or against.
-            let replay = simulate(part, &phi, upper, &around, &drive, config).ok()?;
+            let replay = simulate(part, &phi, upper, &around, &drive, config).ok().filter(|r| r.untrusted.is_none())?;
             let lacks = lacking(part, &replay, *range, clip.noise_m, config).is_some();
             Some(if lacks { stopped(&twin, &replay, config) } else { None })
         })

@@ -1,5 +1,7 @@
 //! What gets built: boxes, joints and masses of a scene, all in the world frame with everything closed.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
@@ -240,6 +242,39 @@ pub struct LeftOut {
     pub id: String,
     /// Why.
     pub reason: String,
+}
+
+/// Which solids of a twin touch each other, where the model that it comes from says so. By default all do.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct ContactRules {
+    /// What each solid may touch, by its name; one that is not here touches all.
+    pub solids: BTreeMap<String, ContactRule>,
+    /// Pairs of links without contacts, the smaller number first.
+    pub excluded: BTreeSet<[usize; 2]>,
+    /// Pairs of rigid bodies without contacts because one carries the other, the smaller number first.
+    pub family: BTreeSet<[usize; 2]>,
+}
+
+/// What a solid may touch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ContactRule {
+    /// Number of the link that it belongs to.
+    pub link: usize,
+    /// Number of the link that stands for all that are rigidly connected with it.
+    pub body: usize,
+    /// `contype` and `conaffinity` as MuJoCo has them; both 0 where the solid is only seen.
+    pub masks: [u32; 2],
+}
+
+impl ContactRules {
+    /// Whether two solids, by their names, can touch.
+    #[must_use]
+    pub fn meet(&self, a: &str, b: &str) -> bool {
+        let (Some(a), Some(b)) = (self.solids.get(a), self.solids.get(b)) else { return true };
+        let pair = |x: usize, y: usize| [x.min(y), x.max(y)];
+        let masks = a.masks[0] & b.masks[1] != 0 || b.masks[0] & a.masks[1] != 0;
+        masks && !self.excluded.contains(&pair(a.link, b.link)) && !self.family.contains(&pair(a.body, b.body))
+    }
 }
 
 /// Mass properties of boxes of one density; `None` for no boxes.

@@ -5,15 +5,17 @@ use std::path::Path;
 use anyhow::bail;
 use clap::{Args, ValueEnum};
 
+use super::moved::{self, Motion};
 use super::shown;
 use super::twin::JointHands;
+use super::units::UnitsArgs;
 use crate::articulation::Action;
 use crate::hands::{Sample, Trajectory};
 use crate::inference::bare;
 use crate::math::Point;
 use crate::model::{self, furniture};
-use crate::recording::trajectory;
-use crate::twin::{Part, Twin};
+use crate::recording::trajectory::{self, BareTrajectory};
+use crate::twin::{ContactRules, Part, Twin};
 
 /// Arguments of `paws validate` for models that are not ours.
 #[derive(Debug, Clone, Default, Args)]
@@ -22,9 +24,12 @@ pub struct ForeignArgs {
     /// x y z [qx qy qz qw] with or without a time stamp first; JOINT= says what it moved. May be repeated
     #[arg(long = "trajectory", value_name = "[JOINT=]FILE")]
     trajectories: Vec<String>,
-    /// Whether a trajectory opens or closes its part: once for all, or once for each [default: told from its ends]
+    /// Whether a trajectory opens or closes its part: once for all, or once for each [default: told from its motion along
+    /// the joint]
     #[arg(long, value_enum)]
     action: Vec<Way>,
+    #[command(flatten)]
+    units: UnitsArgs,
 }
 
 /// What a trajectory does.
@@ -37,10 +42,12 @@ enum Way {
 impl ForeignArgs {
     /// Refuses the arguments beside a folder of ours, which has its own trajectories.
     pub fn refuse(&self) -> anyhow::Result<()> {
-        if self.trajectories.is_empty() && self.action.is_empty() {
+        if self.trajectories.is_empty() && self.action.is_empty() && self.units.length().is_none() {
             return Ok(());
         }
-        bail!("--trajectory and --action belong to a URDF or MJCF file; a folder of `paws twin` has its own hands")
+        bail!(
+            "--trajectory, --action and --units belong to a URDF or MJCF file; a folder of `paws twin` has its own hands"
+        )
     }
 
     fn action(&self, i: usize) -> anyhow::Result<Option<Action>> {
@@ -66,13 +73,23 @@ pub fn is_model(path: &Path) -> bool {
     path.is_file() && path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("json"))
 }
 
-/// The model as a twin with the hands of its joints, in the twin's order; what was decided on the way is told.
-pub fn load(path: &Path, args: &ForeignArgs) -> anyhow::Result<(Twin, Vec<JointHands>)> {
+/// A model with what was recorded of it.
+pub struct Loaded {
+    /// The model as a twin.
+    pub twin: Twin,
+    /// What of it touches what.
+    pub rules: ContactRules,
+    /// The hands of its joints, in the twin's order.
+    pub hands: Vec<JointHands>,
+}
+
+/// The model as a twin with the hands of its joints; what was decided on the way is told.
+pub fn load(path: &Path, args: &ForeignArgs) -> anyhow::Result<Loaded> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb") || e.eq_ignore_ascii_case("usda")) {
         bail!("{}: cannot be simulated here; give the model as URDF or MJCF", shown(path));
     }
     let model = model::read(path)?;
-    let (twin, notes) = furniture::to_twin(&model);
+    let (twin, rules, notes) = furniture::to_ruled_twin(&model);
     for note in &notes {
         eprintln!("{}: {note}", shown(path));
     }
@@ -97,7 +114,7 @@ pub fn load(path: &Path, args: &ForeignArgs) -> anyhow::Result<(Twin, Vec<JointH
             Some((joint, file)) if !Path::new(argument).is_file() => (Some(joint), Path::new(file)),
             _ => (None, Path::new(argument.as_str())),
         };
-        let recorded = trajectory::read(file)?;
+        let recorded = read(file, args)?;
         let points = bare::robust(&recorded.positions);
         let index = match wanted {
             Some(name) => match twin.furniture.iter().position(|f| f.part.label == name || f.part.id == name) {
@@ -106,9 +123,9 @@ pub fn load(path: &Path, args: &ForeignArgs) -> anyhow::Result<(Twin, Vec<JointH
             },
             None if names.len() == 1 => 0,
             None => {
-                let (index, off) = nearest(&twin, &points);
+                let (index, off) = moved::nearest(&twin, &points);
                 eprintln!(
-                    "{}: taken to move {}, whose handle's path is nearest ({:.1} cm, RMS); JOINT=FILE says otherwise",
+                    "{}: taken to move {}, whose motion is nearest ({:.1} cm, RMS); JOINT=FILE says otherwise",
                     shown(file),
                     names[index],
                     100.0 * off
@@ -117,60 +134,69 @@ pub fn load(path: &Path, args: &ForeignArgs) -> anyhow::Result<(Twin, Vec<JointH
             }
         };
         let part = &twin.furniture[index].part;
-        let action = match args.action(i)? {
-            Some(action) => action,
-            None => guessed(part, &points),
+        moved::check_place(file, &model, part, &points)?;
+        let motion = match args.action(i)? {
+            Some(action) => Motion { action, samples: points.len() },
+            None => told(file, part, &points),
         };
-        if recorded.times_secs.is_empty() {
-            eprintln!("{}: has no time stamps; {RATE_HZ} samples a second are taken", shown(file));
-        }
-        let samples = points
-            .iter()
-            .enumerate()
-            .map(|(k, p)| Sample {
-                frame: k,
-                time_secs: recorded.times_secs.get(k).copied().unwrap_or(k as f64 / RATE_HZ),
-                observed: recorded.positions[k],
-                smoothed: *p,
-                accepted: true,
-            })
-            .collect();
-        let made = Trajectory { side: None, samples, action, ends_seen: [true; 2] };
+        let made = as_hand(&recorded, &points, motion);
         if let Err(fault) = made.check() {
             bail!("{}: {fault}", shown(file));
         }
         let name = file.file_stem().map_or_else(|| shown(file), |s| s.to_string_lossy().into_owned());
         hands[index].clips.push((name, made));
     }
-    Ok((twin, hands))
+    Ok(Loaded { twin, rules, hands })
 }
 
 /// Samples a second of a path without time stamps: a video's.
 const RATE_HZ: f64 = 30.0;
 
-/// The part whose handle's path is nearest to the points, and the root mean square distance, metres.
-fn nearest(twin: &Twin, points: &[Point]) -> (usize, f64) {
-    let off = |part: &Part| {
-        let phi = part.joint.articulation;
-        let squares: f64 = points
-            .iter()
-            .map(|p| {
-                let opening = phi.opening_at(&part.handle, p).clamp(0.0, part.joint.upper);
-                (phi.motion(opening) * part.handle - p).norm_squared()
-            })
-            .sum();
-        (squares / points.len().max(1) as f64).sqrt()
-    };
-    twin.furniture
-        .iter()
-        .map(|f| off(&f.part))
-        .enumerate()
-        .min_by(|a, b| a.1.total_cmp(&b.1))
-        .unwrap_or((0, f64::INFINITY))
+/// A recorded path; what was left out of it, and what its time stamps are, is told.
+fn read(file: &Path, args: &ForeignArgs) -> anyhow::Result<BareTrajectory> {
+    let recorded = trajectory::read_in(file, args.units.length())?;
+    for note in &recorded.notes {
+        eprintln!("{}: {note}", shown(file));
+    }
+    moved::check_times(file, &recorded)?;
+    if recorded.times_secs.is_empty() {
+        eprintln!("{}: has no time stamps; {RATE_HZ} samples a second are taken", shown(file));
+    }
+    Ok(recorded)
 }
 
-/// What begins nearer to the closed handle than it ends opens.
-fn guessed(part: &Part, points: &[Point]) -> Action {
-    let far = |p: Option<&Point>| p.map_or(0.0, |p| (p - part.handle).norm());
-    if far(points.first()) <= far(points.last()) { Action::Open } else { Action::Close }
+/// What a path does to its part, by its motion along the joint, which is told.
+fn told(file: &Path, part: &Part, points: &[Point]) -> Motion {
+    let motion = moved::motion(part, points);
+    let word = match motion.action {
+        Action::Open => "open",
+        Action::Close => "close",
+    };
+    eprintln!(
+        "{}: taken to {word} {}, from the motion along its joint; --action says otherwise",
+        shown(file),
+        part.label
+    );
+    if motion.samples < points.len() {
+        eprintln!("{}: goes there and back; it is replayed up to where it turns", shown(file));
+    }
+    motion
+}
+
+/// The path as a hand's.
+fn as_hand(recorded: &BareTrajectory, points: &[Point], motion: Motion) -> Trajectory {
+    let samples = points
+        .iter()
+        .zip(&recorded.positions)
+        .take(motion.samples)
+        .enumerate()
+        .map(|(k, (smoothed, observed))| Sample {
+            frame: k,
+            time_secs: recorded.times_secs.get(k).copied().unwrap_or(k as f64 / RATE_HZ),
+            observed: *observed,
+            smoothed: *smoothed,
+            accepted: true,
+        })
+        .collect();
+    Trajectory { side: None, samples, action: motion.action, ends_seen: [true; 2] }
 }

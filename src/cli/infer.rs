@@ -7,22 +7,25 @@ use clap::Args;
 
 use super::output::write_file;
 use super::progress::Steps;
+use super::units::UnitsArgs;
 use super::words::{self as model, Asked, WordsArgs};
 use super::{Answer, ConfigFile, Opening, print, shown};
 use crate::articulation::Outcome;
 use crate::config::Config;
 use crate::evaluation::Predictions;
-use crate::inference::bare;
+use crate::inference::bare::{self, BareJoint};
 use crate::json;
 use crate::pipeline::Scene;
-use crate::recording::{Recording, trajectory};
+use crate::recording::Recording;
+use crate::recording::trajectory::{self, LengthUnit};
 use crate::report::table::aligned;
 use crate::report::{files, words};
 use crate::vlm::Usage;
 
 #[derive(Debug, Args)]
 pub struct InferArgs {
-    /// Folders of recordings, or files of bare trajectories (x y z [qx qy qz qw], with or without a time stamp first)
+    /// Folders of recordings, or files of bare trajectories (x y z [qx qy qz qw], with or without a time stamp first, or as a
+    /// header names the columns)
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
     /// Write predictions (recordings) or joints (trajectories) as JSON to this file
@@ -34,6 +37,8 @@ pub struct InferArgs {
     physics: bool,
     #[command(flatten)]
     opening: Opening,
+    #[command(flatten)]
+    units: UnitsArgs,
     #[command(flatten)]
     config: ConfigFile,
     #[command(flatten)]
@@ -56,8 +61,11 @@ pub fn run(args: &InferArgs) -> anyhow::Result<Answer> {
     if folders.is_empty() && args.physics {
         bail!("--physics is for recordings (folders): around a bare trajectory there is nothing to run into");
     }
+    if !folders.is_empty() && args.units.length().is_some() {
+        bail!("--units is for bare trajectories (files): a recording is in metres");
+    }
     if folders.is_empty() {
-        bare_trajectories(&trajectories, &config, args.out.as_deref())
+        bare_trajectories(&trajectories, args.units.length(), &config, args.out.as_deref())
     } else {
         recordings(&folders, args.opening, &config, args.words.open()?.as_ref(), args.out.as_deref())
     }
@@ -140,40 +148,67 @@ pub fn weigh(scene: &mut Scene, recording: &Recording, config: &Config, steps: &
     }
 }
 
-fn bare_trajectories(paths: &[&PathBuf], config: &Config, out: Option<&Path>) -> anyhow::Result<Answer> {
+fn bare_trajectories(
+    paths: &[&PathBuf],
+    unit: Option<LengthUnit>,
+    config: &Config,
+    out: Option<&Path>,
+) -> anyhow::Result<Answer> {
     let header = ["trajectory", "type", "axis", "range", "residual", "other type's", "why"];
     let mut rows = vec![header.map(str::to_owned).to_vec()];
     let mut results = Vec::new();
     let mut found = false;
+    let mut unread = Vec::new();
     for path in paths {
-        let outcome = bare::infer(&trajectory::read(path)?, &config.inference);
-        let mut row = vec![shown(path)];
-        match &outcome {
-            Outcome::Found(j) => {
-                found = true;
-                let a = j.joint.axis;
-                let doubt = if j.ambiguous { " (ambiguous)" } else { "" };
-                row.extend([
-                    format!("{}{doubt}", j.joint.kind.word()),
-                    format!("{:.3} {:.3} {:.3}", a.x, a.y, a.z),
-                    words::amount(j.joint.kind, j.range),
-                    words::centimetres(j.residual_m),
-                    j.other_residual_m.map_or("-".to_owned(), words::centimetres),
-                    j.reason.clone(),
-                ]);
+        let read = match trajectory::read_in(path, unit) {
+            Ok(read) => read,
+            // One that cannot be read costs only itself.
+            Err(error) => {
+                unread.push(error.to_string());
+                continue;
             }
-            Outcome::Abstained(reason) => {
-                row.extend(["-", "-", "-", "-", "-"].map(str::to_owned));
-                row.push(format!("abstained: {reason}"));
-            }
+        };
+        for note in &read.notes {
+            eprintln!("{}: {note}", shown(path));
         }
-        rows.push(row);
+        let outcome = bare::infer(&read, &config.inference);
+        found |= outcome.found().is_some();
+        rows.push(row(path, &outcome));
         results.push(serde_json::json!({"file": shown(path), "outcome": outcome}));
     }
-    print(&aligned(&rows))?;
-    if let Some(out) = out {
-        write_file(out, json::text(&results)?)?;
-        eprintln!("joints: {}", shown(out));
+    if rows.len() > 1 {
+        print(&aligned(&rows))?;
+        if let Some(out) = out {
+            write_file(out, json::text(&results)?)?;
+            eprintln!("joints: {}", shown(out));
+        }
+    }
+    if !unread.is_empty() {
+        bail!("{}", unread.join("\n       "));
     }
     Ok(if found { Answer::Yes } else { Answer::No })
+}
+
+/// A trajectory's row of the table.
+fn row(path: &Path, outcome: &Outcome<BareJoint>) -> Vec<String> {
+    let mut row = vec![shown(path)];
+    match outcome {
+        Outcome::Found(j) => {
+            let a = j.joint.axis;
+            let doubt = if j.ambiguous { " (ambiguous)" } else { "" };
+            row.extend([
+                format!("{}{doubt}", j.joint.kind.word()),
+                format!("{:.3} {:.3} {:.3}", a.x, a.y, a.z),
+                words::amount(j.joint.kind, j.range),
+                words::centimetres(j.residual_m),
+                j.other_residual_m.map_or("-".to_owned(), words::centimetres),
+                j.reason.clone(),
+            ]);
+        }
+        Outcome::Abstained(reason) => {
+            row.extend(["-", "-", "-", "-", "-"].map(str::to_owned));
+            row.push(format!("abstained: {reason}"));
+        }
+    }
+    row
 }

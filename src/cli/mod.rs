@@ -12,10 +12,12 @@ mod foreign;
 mod infer;
 mod keep;
 mod measure;
+mod moved;
 mod output;
 mod progress;
 mod synth;
 mod twin;
+mod units;
 mod validate;
 mod words;
 

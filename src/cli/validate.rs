@@ -29,13 +29,16 @@ pub struct ValidateArgs {
 
 pub fn run(args: &ValidateArgs) -> anyhow::Result<Answer> {
     let config = args.config.read()?;
-    let (twin, in_order) = if foreign::is_model(&args.twin) {
-        foreign::load(&args.twin, &args.foreign)?
+    let (twin, rules, in_order) = if foreign::is_model(&args.twin) {
+        let foreign::Loaded { twin, rules, hands } = foreign::load(&args.twin, &args.foreign)?;
+        (twin, Some(rules), hands)
     } else {
         args.foreign.refuse()?;
-        ours(&args.twin)?
+        let (twin, hands) = ours(&args.twin)?;
+        (twin, None, hands)
     };
-    let report = validation::validate(&twin, &as_hands(&in_order), &Vector::z(), &config.validation)?;
+    let hands = as_hands(&in_order);
+    let report = validation::validate_ruled(&twin, rules.as_ref(), &hands, &Vector::z(), &config.validation)?;
     let header = [
         "joint",
         "clip",
@@ -53,10 +56,12 @@ pub fn run(args: &ValidateArgs) -> anyhow::Result<Answer> {
     let mut verdicts = String::new();
     for (check, f) in report.joints.iter().zip(&twin.furniture) {
         let kind = f.part.joint.articulation.kind;
+        // Other people's joints go by the names that they have in their file.
+        let name = if rules.is_some() { &f.part.label } else { &check.id };
         for c in &check.clips {
             let replay = &c.replay;
             rows.push(vec![
-                check.id.clone(),
+                name.clone(),
                 c.clip.clone(),
                 format!("{:?}", c.action).to_lowercase(),
                 words::centimetres(replay.rms_m),
@@ -70,7 +75,7 @@ pub fn run(args: &ValidateArgs) -> anyhow::Result<Answer> {
             ]);
         }
         let odds = check.margin_nats.map_or(String::new(), |nats| format!(" ({})", words::margin(Some(nats))));
-        verdicts += &format!("{}: {}{odds}: {}\n", check.id, check.verdict.word(), check.reason);
+        verdicts += &format!("{name}: {}{odds}: {}\n", check.verdict.word(), check.reason);
     }
     print(&aligned(&rows))?;
     print(&format!("\n{verdicts}"))?;

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::bend;
+pub(crate) use super::bend::robust;
 use crate::articulation::{Articulation, JointKind, Outcome};
 use crate::config;
 use crate::geometry::candidates::arc_about;
@@ -32,6 +34,8 @@ pub struct BareJoint {
 
 /// A part that turns by more than this has a hinge, whatever its path looks like: markers are read to a few degrees.
 const MIN_TURN_RAD: f64 = 0.26;
+/// One type is taken for sure where it is this much likelier than the other, nats: twenty to one, as in validation.
+const SURE_NATS: f64 = 3.0;
 
 /// Infers the joint of a bare trajectory.
 #[must_use]
@@ -47,43 +51,39 @@ pub fn infer(trajectory: &BareTrajectory, config: &config::Inference) -> Outcome
     if extent < config.prismatic_tolerance_m {
         return Outcome::Abstained(format!("the points stay within {:.0} mm: nothing moved", 2000.0 * extent));
     }
-    let turn = turn(trajectory);
+    if !bend::progresses(&points) {
+        return Outcome::Abstained(format!(
+            "the points scatter over {:.0} mm and get nowhere: nothing moved",
+            2000.0 * extent
+        ));
+    }
     let Some(slide) = slide(&points) else { return Outcome::Abstained("the points have no direction".to_owned()) };
-    let hinge = hinge(&points, turn.as_ref().filter(|t| t.angle >= MIN_TURN_RAD).map(|t| t.axis));
+    let turn = turn(trajectory);
+    let (hinge, contradicted) = hinge(&points, turn.as_ref().filter(|t| t.angle >= MIN_TURN_RAD).map(|t| t.axis));
     let slide_residual = path::across(&points, &slide.axis).map_or(f64::INFINITY, f64::sqrt);
     let hinge_fit = hinge.and_then(|j| path::about_line(&points, &j.line()).map(|f| (j, f)));
-    let circle_radius_m = hinge_fit.map(|(_, f)| f.radius);
-    let hinge_residual = hinge_fit.map(|(_, f)| f.variance().sqrt());
+    let nats = bend::hinge_over_slide(&points, hinge.as_ref(), config.max_radius_m).unwrap_or(0.0);
+    let radius = hinge_fit.map(|(_, f)| f.radius);
 
-    let (kind, ambiguous, reason) = match (&turn, hinge_fit, hinge_residual) {
-        (Some(t), Some(_), _) if t.angle >= MIN_TURN_RAD => {
+    let (kind, ambiguous, mut reason) = match (&turn, radius) {
+        (Some(t), Some(_)) if t.angle >= MIN_TURN_RAD => {
             (JointKind::Revolute, false, format!("the part itself turned by {:.0} deg", t.angle.to_degrees()))
         }
-        (Some(t), _, _) if extent > 0.1 && t.angle < MIN_TURN_RAD => {
+        (Some(t), _) if extent > 0.1 && t.angle < MIN_TURN_RAD => {
             (JointKind::Prismatic, false, format!("the part itself turned by only {:.0} deg", t.angle.to_degrees()))
         }
-        (_, Some((_, fit)), Some(residual)) => {
-            let bend = residual < 0.5 * slide_residual && slide_residual > 0.002;
-            if !bend {
-                (JointKind::Prismatic, false, "a line explains the points as well as a circle does".to_owned())
-            } else if fit.radius > config.max_radius_m {
-                // A hook that slips on a sliding door bends its path, but no door is this wide. Up to twice the widest
-                // door it could still be one, read badly.
-                let text = format!("the best circle has a radius of {:.2} m, wider than any door", fit.radius);
-                (JointKind::Prismatic, fit.radius < 2.0 * config.max_radius_m, text)
-            } else {
-                (JointKind::Revolute, false, format!("a circle of radius {:.2} m explains the points", fit.radius))
-            }
-        }
-        _ => (JointKind::Prismatic, false, "the points lie on a line".to_owned()),
+        (_, radius) => by_the_path(nats, radius, config.max_radius_m),
     };
+    if contradicted {
+        reason += "; the orientations turn about another axis than the path does: is w written first? Name the columns";
+    }
     let (joint, residual_m, other_residual_m) = match (kind, hinge_fit) {
         (JointKind::Revolute, Some((joint, fit))) => (joint, fit.variance().sqrt(), Some(slide_residual)),
-        _ => (slide, slide_residual, hinge_residual),
+        _ => (slide, slide_residual, hinge_fit.map(|(_, f)| f.variance().sqrt())),
     };
     let first = points[0];
     let openings = super::openings(&joint, &first, &points);
-    let range = stats::quantile(&openings, 0.99).unwrap_or(0.0) - stats::quantile(&openings, 0.01).unwrap_or(0.0);
+    let range = bend::range(&joint, &openings, radius.unwrap_or(1.0), residual_m);
     let sense = openings.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
     let joint = if sense < 0.0 { joint.reversed() } else { joint };
     Outcome::Found(BareJoint {
@@ -91,24 +91,33 @@ pub fn infer(trajectory: &BareTrajectory, config: &config::Inference) -> Outcome
         range,
         residual_m,
         other_residual_m,
-        circle_radius_m,
+        circle_radius_m: radius,
         turn_rad: turn.map(|t| t.angle),
         ambiguous,
         reason,
     })
 }
 
-/// The points without single jumps: each replaced by the median of its neighbourhood.
-pub(crate) fn robust(points: &[Point]) -> Vec<Point> {
-    const REACH: usize = 2;
-    (0..points.len())
-        .map(|i| {
-            let window = &points[i.saturating_sub(REACH)..(i + REACH + 1).min(points.len())];
-            let coordinate =
-                |k: usize| stats::median(&window.iter().map(|p| p[k]).collect::<Vec<_>>()).unwrap_or(points[i][k]);
-            Point::new(coordinate(0), coordinate(1), coordinate(2))
-        })
-        .collect()
+/// Type, whether it is ambiguous, and why, by how much likelier a hinge makes the path than a slide (nats). Where neither is
+/// surely better the simpler one is taken.
+fn by_the_path(nats: f64, radius: Option<f64>, max_radius_m: f64) -> (JointKind, bool, String) {
+    if let Some(r) = radius.filter(|r| *r <= max_radius_m && nats >= SURE_NATS) {
+        return (JointKind::Revolute, false, format!("a circle of radius {r:.2} m explains the points"));
+    }
+    if nats > -SURE_NATS {
+        // Where the points' own circle is wider than any door, the widest door was compared.
+        let r = radius.unwrap_or(max_radius_m).min(max_radius_m);
+        let text = format!("a line and a circle of radius {r:.2} m both explain the points; the simpler one is taken");
+        return (JointKind::Prismatic, true, text);
+    }
+    match radius {
+        // A hook that slips on a sliding door bends its path, but no door is this wide.
+        Some(r) if r > max_radius_m => {
+            let text = format!("the best circle has a radius of {r:.2} m, wider than any door");
+            (JointKind::Prismatic, false, text)
+        }
+        _ => (JointKind::Prismatic, false, "a line explains the points better than a circle does".to_owned()),
+    }
 }
 
 struct Turn {
@@ -146,13 +155,18 @@ fn slide(points: &[Point]) -> Option<Articulation> {
     Some(Articulation { kind: JointKind::Prismatic, axis, origin: points[0] })
 }
 
-/// The circle in the points' own plane, or about a known direction.
-fn hinge(points: &[Point], direction: Option<Vector>) -> Option<Articulation> {
-    let direction = match direction {
-        Some(d) => d,
-        None => Plane::fit(points)?.normal,
-    };
-    arc_about(points, &direction)
+/// The circle about the direction in which the orientations turned, else in the points' own plane; and whether the two
+/// contradict each other, which makes the points' own the better one.
+fn hinge(points: &[Point], turned: Option<Vector>) -> (Option<Articulation>, bool) {
+    let own = Plane::fit(points).and_then(|plane| arc_about(points, &plane.normal));
+    let Some(direction) = turned else { return (own, false) };
+    let about = arc_about(points, &direction);
+    let off = |joint: &Articulation| path::about_line(points, &joint.line()).map_or(f64::INFINITY, |f| f.variance());
+    // Points that leave their own circle less than half as far know its plane better than the orientations do.
+    let contradicted = own.as_ref().is_some_and(|own| {
+        bend::contradicts(&direction, &own.axis) && about.as_ref().is_none_or(|about| 4.0 * off(own) < off(about))
+    });
+    if contradicted { (own, true) } else { (about.or(own), false) }
 }
 
 #[cfg(test)]
@@ -175,7 +189,7 @@ mod tests {
         let joint = found.found().unwrap();
         assert_eq!(joint.joint.kind, JointKind::Revolute);
         assert!(joint.joint.axis.z > 0.999 && joint.joint.line().distance(&Point::origin()) < 1e-3);
-        assert!((joint.range - 0.885).abs() < 0.05);
+        assert!((joint.range - 0.885).abs() < 1e-6);
 
         let line: Vec<Point> =
             (0..60).map(|i| Point::new(0.005 * f64::from(i), 0.001 * f64::from(i % 2), 0.0)).collect();
@@ -187,5 +201,85 @@ mod tests {
     fn standing_still_is_no_motion() {
         let still = vec![Point::new(1.0, 2.0, 3.0); 50];
         assert!(infer(&bare(still), &config::Inference::default()).reason().unwrap().contains("nothing moved"));
+    }
+
+    fn arc(n: u32, degrees: f64) -> Vec<Point> {
+        (0..n)
+            .map(|i| {
+                let a = degrees.to_radians() * f64::from(i) / f64::from(n - 1);
+                Point::new(0.55 * a.cos(), 0.55 * a.sin(), 0.3)
+            })
+            .collect()
+    }
+
+    /// Noise of a normal distribution's kind, the same each time: sums of a congruential generator.
+    fn noise(seed: &mut u64) -> f64 {
+        (0..12)
+            .map(|_| {
+                *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (*seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+            })
+            .sum()
+    }
+
+    fn shaken(points: &[Point], std_m: f64) -> Vec<Point> {
+        let mut seed = 7;
+        points.iter().map(|p| p + Vector::new(noise(&mut seed), noise(&mut seed), noise(&mut seed)) * std_m).collect()
+    }
+
+    #[test]
+    fn exact_points_give_the_whole_range_however_few_they_are() {
+        for n in [5, 7, 10, 20, 60, 400] {
+            for degrees in [20.0, 69.0, 110.0] {
+                let found = infer(&bare(arc(n, degrees)), &config::Inference::default());
+                let joint = found.found().unwrap();
+                assert_eq!(joint.joint.kind, JointKind::Revolute, "{n} {degrees}");
+                let off = (joint.range.to_degrees() - degrees).abs();
+                assert!(off < 0.05, "{n} {degrees}: {off}");
+            }
+            let line = (0..n).map(|i| Point::new(0.4 * f64::from(i) / f64::from(n - 1), 0.0, 0.0)).collect();
+            let found = infer(&bare(line), &config::Inference::default());
+            let joint = found.found().unwrap();
+            assert!(joint.joint.kind == JointKind::Prismatic && !joint.ambiguous, "{}", joint.reason);
+            assert!((joint.range - 0.4).abs() < 1e-4, "{n}");
+        }
+    }
+
+    #[test]
+    fn a_short_noisy_arc_is_ambiguous_and_a_wide_one_and_a_long_line_are_not() {
+        let config = config::Inference::default();
+        for (degrees, ambiguous) in [(10.0, true), (15.0, true), (45.0, false), (90.0, false)] {
+            let found = infer(&bare(shaken(&arc(90, degrees), 0.003)), &config);
+            let joint = found.found().unwrap();
+            assert_eq!(joint.ambiguous, ambiguous, "{degrees}: {}", joint.reason);
+            assert_eq!(joint.joint.kind == JointKind::Prismatic, ambiguous, "{degrees}");
+        }
+        let line: Vec<Point> = (0..60).map(|i| Point::new(0.4 * f64::from(i) / 59.0, 0.0, 0.0)).collect();
+        let found = infer(&bare(shaken(&line, 0.003)), &config);
+        assert!(found.found().is_some_and(|j| !j.ambiguous && j.joint.kind == JointKind::Prismatic));
+    }
+
+    #[test]
+    fn a_still_hand_that_trembles_moved_nothing() {
+        let still = shaken(&[Point::new(1.0, 2.0, 3.0); 120], 0.01);
+        let found = infer(&bare(still), &config::Inference::default());
+        assert!(found.reason().unwrap().contains("nothing moved"), "{found:?}");
+    }
+
+    #[test]
+    fn a_single_jump_is_no_motion_and_orientations_about_another_axis_are_told() {
+        let mut points = arc(60, 69.0);
+        points[30] = Point::new(-1.0, -1.0, -1.0);
+        let found = infer(&bare(points.clone()), &config::Inference::default());
+        assert!((found.found().unwrap().range.to_degrees() - 69.0).abs() < 1.5);
+        // About z, with w written first.
+        let half = |i: usize| 0.5 * 69f64.to_radians() * i as f64 / 59.0;
+        let swapped = |i: usize| nalgebra::Quaternion::new(half(i).sin(), half(i).cos(), 0.0, 0.0);
+        let orientations = (0..60).map(|i| nalgebra::UnitQuaternion::from_quaternion(swapped(i))).collect();
+        let odd = BareTrajectory { positions: arc(60, 69.0), orientations, ..Default::default() };
+        let found = infer(&odd, &config::Inference::default());
+        let joint = found.found().unwrap();
+        assert!(joint.joint.kind == JointKind::Revolute && joint.joint.axis.z.abs() > 0.99, "{}", joint.reason);
+        assert!(joint.reason.contains("w written first"), "{}", joint.reason);
     }
 }

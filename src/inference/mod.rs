@@ -2,6 +2,7 @@
 
 pub mod aggregate;
 pub mod bare;
+mod bend;
 pub mod paper;
 pub mod uncertainty;
 

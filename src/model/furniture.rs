@@ -1,13 +1,13 @@
 //! A model as furniture: one piece for each joint that moves, in the world frame with everything closed.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Matrix3;
 
-use super::{Model, ModelJoint, Shape, Tree, check, penetration};
+use super::{Format, Model, ModelJoint, Shape, Tree, check, penetration};
 use crate::articulation::{Articulation, JointKind};
 use crate::math::{Point, Pose, Vector, any_orthogonal, centroid, reject, unit};
-use crate::twin::{Furniture, Joint, LeftOut, OrientedBox, Part, Role, Solid, Twin};
+use crate::twin::{ContactRule, ContactRules, Furniture, Joint, LeftOut, OrientedBox, Part, Role, Solid, Twin};
 
 /// Where a model states no mass: light wood and board, kg/m^3.
 const DENSITY: f64 = 700.0;
@@ -22,6 +22,14 @@ const THINNEST_M: f64 = 1e-3;
 /// link has no others, and the boxes around what is no box.
 #[must_use]
 pub fn to_twin(model: &Model) -> (Twin, Vec<String>) {
+    let (twin, _, notes) = to_ruled_twin(model);
+    (twin, notes)
+}
+
+/// The same with what the model says about its contacts: shapes that are only seen, masks, excluded pairs, and in MJCF parent
+/// and child of which neither is fixed to the world.
+#[must_use]
+pub fn to_ruled_twin(model: &Model) -> (Twin, ContactRules, Vec<String>) {
     let mut notes = model.notes.clone();
     let mut twin = Twin {
         name: model.name.chars().filter(|c| !c.is_control()).collect(),
@@ -37,7 +45,7 @@ pub fn to_twin(model: &Model) -> (Twin, Vec<String>) {
             twin.left_out =
                 model.moving().map(|(_, j)| LeftOut { id: j.name.clone(), reason: reason.clone() }).collect();
             notes.push(format!("the links are no tree: {reason}"));
-            return (twin, notes);
+            return (twin, ContactRules::default(), notes);
         }
     };
     let poses = model.poses(&tree, &model.closed());
@@ -74,7 +82,35 @@ pub fn to_twin(model: &Model) -> (Twin, Vec<String>) {
         notes.push(format!("no part states its mass; {DENSITY} kg/m^3 is taken"));
     }
     boards(model, &tree, &poses, &built, &mut twin, &mut names, &mut notes);
-    (twin, notes)
+    let rules = ContactRules { solids: names.solids, excluded: excluded(model), family: family(model, &tree) };
+    (twin, rules, notes)
+}
+
+/// Pairs of links that the file excludes.
+fn excluded(model: &Model) -> BTreeSet<[usize; 2]> {
+    let index: BTreeMap<&str, usize> = model.links.iter().enumerate().map(|(i, l)| (l.name.as_str(), i)).collect();
+    let find = |name: &String| index.get(name.as_str()).copied();
+    model.excludes.iter().filter_map(|[a, b]| find(a).zip(find(b))).map(|(a, b)| [a.min(b), a.max(b)]).collect()
+}
+
+/// Pairs of rigid bodies of which one carries the other and is not fixed to the world: MuJoCo lets them overlap.
+fn family(model: &Model, tree: &Tree) -> BTreeSet<[usize; 2]> {
+    let mut pairs = BTreeSet::new();
+    if !matches!(model.format, Format::Mjcf { .. }) {
+        return pairs;
+    }
+    let ground = tree.order.first().copied();
+    for body in tree.body.iter().copied() {
+        let mut above = tree.parent[body];
+        // Links between the joints of one body are no bodies.
+        while let Some(link) = above.filter(|link| model.links[*link].between) {
+            above = tree.parent[link];
+        }
+        if let Some(carrier) = above.map(|link| tree.body[link]).filter(|carrier| Some(*carrier) != ground) {
+            pairs.insert([body.min(carrier), body.max(carrier)]);
+        }
+    }
+    pairs
 }
 
 /// Frames, and links between two joints of one body, weigh nothing.
@@ -82,23 +118,36 @@ fn weightless(link: &super::Link) -> bool {
     link.between || (link.mass.is_none() && link.shapes.is_empty() && link.meshes.is_empty())
 }
 
-/// Names that are safe in every format, each once, and how often each was asked for again.
+/// Names that are safe in every format, each once.
 #[derive(Default)]
-struct Names(BTreeMap<String, usize>);
+struct Names {
+    /// How often each was asked for again.
+    asked: BTreeMap<String, usize>,
+    /// What the solids that were named may touch.
+    solids: BTreeMap<String, ContactRule>,
+}
 
 impl Names {
     fn safe(&mut self, wanted: &str) -> String {
         let clean: String =
             wanted.chars().take(64).map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '_' }).collect();
         let clean = if clean.is_empty() { "unnamed".to_owned() } else { clean };
-        let mut number = self.0.get(&clean).copied().unwrap_or(0);
+        let mut number = self.asked.get(&clean).copied().unwrap_or(0);
         let mut name = clean.clone();
-        while self.0.contains_key(&name) {
+        while self.asked.contains_key(&name) {
             number += 1;
             name = format!("{clean}_{}", number + 1);
         }
-        self.0.insert(clean, number);
-        self.0.entry(name.clone()).or_insert(0);
+        self.asked.insert(clean, number);
+        self.asked.entry(name.clone()).or_insert(0);
+        name
+    }
+
+    /// The name of a link's shape, which is remembered with what the shape may touch.
+    fn solid(&mut self, wanted: &str, shape: &Shape, link: usize, tree: &Tree) -> String {
+        let name = self.safe(wanted);
+        let masks = if shape.visual { [0, 0] } else { shape.masks };
+        self.solids.insert(name.clone(), ContactRule { link, body: tree.body[link], masks });
         name
     }
 }
@@ -145,6 +194,7 @@ impl Piece<'_> {
         let sense = if open >= closed { 1.0 } else { -1.0 };
         let axis = frame.rotation * written * sense;
         let upper = (open - closed).abs();
+        other_unit(kind, upper)?;
         let amount = |x: f64| match kind {
             JointKind::Revolute => format!("{:.0}°", x.to_degrees()),
             JointKind::Prismatic => format!("{x:.3} m"),
@@ -181,7 +231,7 @@ impl Piece<'_> {
                 let wanted = shape.name.clone().unwrap_or_else(|| format!("{}_{k}", link.name));
                 let is_handle = wanted.to_ascii_lowercase().contains("handle");
                 let role = if is_handle { Role::Handle } else { Role::Front };
-                solids.push(solid(names.safe(&wanted), shape, &self.poses[i], role));
+                solids.push(solid(names.solid(&wanted, shape, i, tree), shape, &self.poses[i], role));
             }
         }
         if solids.is_empty() {
@@ -190,6 +240,10 @@ impl Piece<'_> {
         let corners: Vec<Point> = solids.iter().flat_map(|s| s.shape.corners()).collect();
         if !corners.iter().all(is_near) {
             return Err(format!("its part lies farther than {FAR_M} m away"));
+        }
+        let size = solids.iter().map(|s| 2.0 * s.shape.half.max()).fold(0.0, f64::max);
+        if size > HUGE_M {
+            return Err(format!("its part is {size:.0} m long; write it in metres (a scale of 0.001 for millimetres)"));
         }
         let anchor = frame * joint.anchor;
         let line = Articulation { kind, axis, origin: anchor };
@@ -225,6 +279,25 @@ impl Piece<'_> {
 
     fn is_inside(&self, inside: &[bool], link: &str) -> bool {
         self.model.links.iter().position(|l| l.name == link).is_some_and(|i| inside[i])
+    }
+}
+
+/// Nothing that a person opens is longer, metres.
+const HUGE_M: f64 = 20.0;
+
+/// Refuses a range that only another unit explains.
+fn other_unit(kind: JointKind, upper: f64) -> Result<(), String> {
+    // Knobs go round twice at the most.
+    const TURNS_RAD: f64 = 4.0 * std::f64::consts::PI + 0.1;
+    match kind {
+        JointKind::Revolute if upper > TURNS_RAD => Err(format!(
+            "it turns by {upper:.0} rad, {:.0} times round; write its limits in radians (MJCF: or say angle=\"degree\")",
+            upper / std::f64::consts::TAU
+        )),
+        JointKind::Prismatic if upper > HUGE_M => {
+            Err(format!("it slides by {upper:.0} m; write its limits in metres, not in millimetres"))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -314,7 +387,7 @@ fn boards(
                 continue;
             }
             let wanted = shape.name.clone().unwrap_or_else(|| format!("{}_{k}", link.name));
-            let name = names.safe(&wanted);
+            let name = names.solid(&wanted, shape, i, tree);
             if is_room {
                 twin.room.push(Solid { name, role: Role::Room, shape: board, seen: true });
             } else {

@@ -4,6 +4,7 @@
 
 pub mod at_work;
 mod folder;
+mod columns;
 pub mod grid;
 pub mod images;
 pub mod narration;
@@ -11,6 +12,7 @@ mod read;
 mod reconstruction;
 pub mod segments;
 pub mod sketch;
+mod sniff;
 pub mod trajectory;
 
 use std::collections::BTreeMap;

@@ -7,5 +7,5 @@ pub mod world;
 
 pub use replay::{Drive, Replay, simulate};
 pub use rivals::Resolution;
-pub use verdict::{ClipCheck, JointCheck, RivalCheck, Validation, Verdict, log_odds, validate};
+pub use verdict::{ClipCheck, JointCheck, RivalCheck, Validation, Verdict, log_odds, validate, validate_ruled};
 pub use world::{Contact, Surroundings};

@@ -2,12 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::verdict::amount;
 use super::world::{Contact, Surroundings, World};
 use crate::articulation::{Articulation, JointKind};
 use crate::config;
 use crate::error::{Error, Result};
 use crate::math::{Point, Vector, reject};
-use crate::twin::{Part, mass_properties};
+use crate::twin::{MassProperties, Part, mass_properties};
 
 /// Where the hand wants the grip to be.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,6 +64,9 @@ pub struct Replay {
     pub handle: Vec<Point>,
     /// The grip on the closed part, world.
     pub grip: Point,
+    /// Why the simulation itself is not to be believed, in words; `None` where nothing speaks against it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub untrusted: Option<String>,
 }
 
 impl Replay {
@@ -83,10 +87,11 @@ const REST_SECS: f64 = 0.25;
 /// Pulls `part` along `drive` under `joint` (which may be a rival of the part's own) with the limits 0..`upper`.
 ///
 /// The hand is a spring and a damper of `hand_stiffness_n_per_m`, critical on the mass of the part, and no stronger than
-/// `hand_force_max_n`. Fingers move on a handle: within `grip_slack_m` the spring does not pull.
+/// `hand_force_max_n`. Fingers move on a handle: within `grip_slack_m` the spring does not pull. A part of grams moves with
+/// the hand's own mass. A simulation that blew up all the same says so in [`Replay::untrusted`].
 ///
 /// # Errors
-/// Where the simulation gives no finite state, or the path's times cannot be seconds of one motion.
+/// Where rapier refuses the joint, or the path's times cannot be seconds of one motion.
 pub fn simulate(
     part: &Part,
     joint: &Articulation,
@@ -108,12 +113,13 @@ pub fn simulate(
     }
     let dt = config.step_secs;
     let start = joint.opening_at(&drive.grip, &first).clamp(0.0, upper);
-    let mut world = World::new(part, joint, upper, start, around, dt)?;
-    let start = world.start;
-
     let properties = mass_properties(&part.solids, around.density);
     let mass = properties.map_or(0.0, |m| m.mass);
     let damping = 2.0 * (config.hand_stiffness_n_per_m * mass.max(0.1)).sqrt();
+    let held = properties.map_or(0.0, |p| held_inertia(joint, &drive.grip, &p, damping * dt));
+    let mut world = World::new(part, joint, upper, start, held, around, dt)?;
+    let start = world.start;
+
     let target = |t: f64| -> Point {
         let t = if t <= end { t } else { (2.0 * end + REST_SECS - t).clamp(0.0, end) };
         at(&drive.times_secs, &drive.path, t)
@@ -148,8 +154,10 @@ pub fn simulate(
         hand: Vec::new(),
         handle: Vec::new(),
         grip: drive.grip,
+        untrusted: None,
     };
-    let (mut sum, mut sum_along) = (0.0, 0.0);
+    let (mut sum, mut sum_along, mut counted) = (0.0, 0.0, 0usize);
+    let mut fastest: f64 = 0.0;
     let mut opening = start;
     for step in 0..steps {
         let t = step as f64 * dt;
@@ -157,11 +165,14 @@ pub fn simulate(
         let wanted_velocity = (target(t + dt) - wanted) / dt;
         let (p, v) = world.point(&drive.grip);
         let force = pull(&(wanted - p), &(wanted_velocity - v), damping, config);
-        if !force.norm().is_finite() {
-            return Err(Error::Simulation(format!("{}: the state is not finite after {t:.2} s", part.id)));
-        }
         world.step(&p, &force);
-        let (now, _) = world.point(&drive.grip);
+        let (now, speed) = world.point(&drive.grip);
+        let state = [force.norm(), now.coords.norm(), speed.norm(), world.kinetic_energy()];
+        if state.iter().any(|x| !x.is_finite()) {
+            out.untrusted = Some(format!("the part's state was no number any more after {t:.2} s"));
+            break;
+        }
+        fastest = fastest.max(speed.norm());
         let angle = joint.opening_at(&drive.grip, &now);
         // Continuous past half a turn.
         opening = if joint.kind == JointKind::Revolute {
@@ -178,6 +189,7 @@ pub fn simulate(
         let distance = error.norm();
         sum += distance * distance;
         sum_along += error.dot(&joint.axis).powi(2);
+        counted += 1;
         hand_work += force.dot(&(now - p));
         let weight_work = -9.81 * mass * (height(&world) - height_at_start);
         out.max_m = out.max_m.max(distance);
@@ -197,16 +209,68 @@ pub fn simulate(
             out.handle.push(now);
         }
     }
-    if world.broke() {
-        return Err(Error::Simulation(format!("{}: rapier put the part in quarantine", part.id)));
+    if world.broke() && out.untrusted.is_none() {
+        out.untrusted = Some("the physics engine gave the part up".to_owned());
     }
-    let count = forward as f64;
+    if out.untrusted.is_none() {
+        out.untrusted = beyond_reason(&out, joint, upper, fastest, config);
+    }
+    let count = counted.max(1) as f64;
     out.rms_m = (sum / count).sqrt();
     out.along_m = (sum_along / count).sqrt();
     out.across_m = ((sum - sum_along).max(0.0) / count).sqrt();
     out.return_error = if drive.back { opening - start } else { 0.0 };
     out.contacts = world.contacts();
     Ok(out)
+}
+
+/// The inertia (kg m^2 about a hinge, kg along a slide) that a joint lacks for a hand that is felt once a step: fingers that
+/// hold a part of grams move with it, and a damper that takes more than three quarters of a velocity in one step makes the
+/// part fly. `impulse_per_speed` is the hand's damping times the step, kg.
+fn held_inertia(joint: &Articulation, grip: &Point, part: &MassProperties, impulse_per_speed: f64) -> f64 {
+    const TAKEN: f64 = 0.75;
+    let own = match joint.kind {
+        JointKind::Prismatic => part.mass,
+        JointKind::Revolute => {
+            let arm = reject(&(part.center - joint.origin), &joint.axis);
+            joint.axis.dot(&(part.inertia * joint.axis)) + part.mass * arm.norm_squared()
+        }
+    };
+    (impulse_per_speed / TAKEN * joint.lever(grip).powi(2) - own).max(0.0)
+}
+
+/// Why a simulation's result cannot be: limits and joints hold in it as far as a motion counts as explained, no hand that
+/// opens furniture throws it, and a part has no more energy than was put into it.
+fn beyond_reason(
+    replay: &Replay,
+    joint: &Articulation,
+    upper: f64,
+    fastest: f64,
+    config: &config::Validation,
+) -> Option<String> {
+    // A ball thrown hard is this fast, m/s.
+    const THROWN: f64 = 20.0;
+    // What a neighbour that falls onto the part may add, J; and what the steps' size makes of the work.
+    const SPARE_J: f64 = 1.0;
+    const SPARE: f64 = 2.0;
+    let [least, most] = replay.reached;
+    let beyond = (most - upper).max(-least).max(0.0);
+    if beyond * joint.lever(&replay.grip) > config.pass_rms_m {
+        return Some(format!("the part went {} beyond its limits", amount(joint.kind, beyond)));
+    }
+    if replay.drift_m > config.pass_rms_m {
+        return Some(format!("the part left its joint by {:.0} cm", 100.0 * replay.drift_m));
+    }
+    if fastest > THROWN {
+        return Some(format!("the handle moved at {fastest:.0} m/s"));
+    }
+    let most_j = SPARE * replay.work_max_j.max(0.0) + SPARE_J;
+    (replay.kinetic_max_j > most_j).then(|| {
+        format!(
+            "the part moved with {:.1} J after {:.1} J of work had been done on it",
+            replay.kinetic_max_j, replay.work_max_j
+        )
+    })
 }
 
 /// Force of the hand for its distance from the grip and the difference of their velocities.

@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::hands::Trajectory;
 use crate::inference::observed_range;
 use crate::math::{Point, Vector, centroid, stats};
-use crate::twin::{Furniture, Part, Twin};
+use crate::twin::{ContactRules, Furniture, Part, Twin};
 
 /// What physics says about a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -134,14 +134,28 @@ pub type Hands<'a> = Vec<(String, &'a Trajectory)>;
 /// Replays every joint of the twin under the hands of its clips. `hands[i]` belongs to `twin.furniture[i]`.
 ///
 /// # Errors
-/// Where a simulation gives no finite state.
+/// Where rapier refuses a joint, or a hand's times cannot be seconds of one motion.
 pub fn validate(twin: &Twin, hands: &[Hands], up: &Vector, config: &config::Validation) -> Result<Validation> {
+    validate_ruled(twin, None, hands, up, config)
+}
+
+/// The same where a model says which of its solids touch each other.
+///
+/// # Errors
+/// Those of [`validate`].
+pub fn validate_ruled(
+    twin: &Twin,
+    rules: Option<&ContactRules>,
+    hands: &[Hands],
+    up: &Vector,
+    config: &config::Validation,
+) -> Result<Validation> {
     let joints = twin
         .furniture
         .par_iter()
         .enumerate()
         .map(|(i, furniture)| {
-            let around = Surroundings::of(twin, i, up);
+            let around = Surroundings { rules, ..Surroundings::of(twin, i, up) };
             check_joint(furniture, hands.get(i).map(Vec::as_slice).unwrap_or_default(), &around, config)
         })
         .collect::<Result<_>>()?;
@@ -256,10 +270,13 @@ fn held_out(joint: &Articulation, clips: &[Evidence], i: usize) -> Option<f64> {
 /// - *It cannot follow*: on more than half of the clips the tracking error is above twice `pass_rms_m` and above twice the
 ///   noise that is left when any hinge or slide may explain the hand. Where none does, the hand is to blame.
 ///
-/// **Undetermined**, else, where there is no hand, where the tracking error is above `pass_rms_m`, or where the best rival is
-/// within `margin_nats`: a motion too small for its noise cannot tell them apart. As rivals stand `rival_shift_m` beside a
-/// hinge, what passes is at least known to that. And where the joint's own log odds, after hand, depth, words and physics, are below
-/// `margin_nats`: a hand alone follows some joints that depth speaks against.
+/// The last two are asked only of simulations that can be trusted ([`Replay::untrusted`]).
+///
+/// **Undetermined**, else, where there is no hand, where the simulations of half of the clips blew up, where the tracking error
+/// is above `pass_rms_m`, or where the best rival is within `margin_nats`: a motion too small for its noise cannot tell them
+/// apart. As rivals stand `rival_shift_m` beside a hinge, what passes is at least known to that. And where the joint's own log
+/// odds, after hand, depth, words and physics, are below `margin_nats`: a hand alone follows some joints that depth speaks
+/// against.
 ///
 /// **Pass** else.
 fn judge(
@@ -270,7 +287,9 @@ fn judge(
     config: &config::Validation,
 ) -> JointCheck {
     let kind = part.joint.articulation.kind;
-    let errors: Vec<f64> = clips.iter().map(|c| c.replay.rms_m).collect();
+    // A simulation that blew up says nothing about the joint.
+    let trusted: Vec<&ClipCheck> = clips.iter().filter(|c| c.replay.untrusted.is_none()).collect();
+    let errors: Vec<f64> = trusted.iter().map(|c| c.replay.rms_m).collect();
     let rms_m = stats::median(&errors).unwrap_or(0.0);
     let range = clips.iter().map(|c| c.observed_range).fold(0.0, f64::max);
     let best = rivals.first();
@@ -290,10 +309,10 @@ fn judge(
             )
         });
     }
-    let blocked = clips.iter().filter_map(|c| blocked(part, c, config)).max_by(|a, b| a.0.total_cmp(&b.0));
+    let blocked = trusted.iter().filter_map(|c| blocked(part, c, config)).max_by(|a, b| a.0.total_cmp(&b.0));
     faults.extend(blocked.map(|(_, why)| why));
-    let off = clips.iter().filter(|c| c.replay.rms_m > 2.0 * config.pass_rms_m.max(c.noise_m)).count();
-    if 2 * off > clips.len() {
+    let off = trusted.iter().filter(|c| c.replay.rms_m > 2.0 * config.pass_rms_m.max(c.noise_m)).count();
+    if 2 * off > trusted.len() {
         faults.push(format!("the handle stays {} (RMS) away from the recorded hand", centimetres(rms_m)));
     }
     let margin_nats = best.map(|r| r.margin_nats);
@@ -301,6 +320,8 @@ fn judge(
         (Verdict::Fail, faults.join("; "))
     } else if clips.is_empty() {
         (Verdict::Undetermined, "no recorded hand to replay".to_owned())
+    } else if let Some(why) = blew_up(&clips).filter(|_| 2 * trusted.len() <= clips.len()) {
+        (Verdict::Undetermined, format!("the simulation is not to be trusted here, because {why}"))
     } else if rms_m > config.pass_rms_m {
         let noises: Vec<f64> = clips.iter().map(|c| c.noise_m).collect();
         let noise = stats::median(&noises).unwrap_or(0.0);
@@ -340,13 +361,18 @@ fn judge(
         verdict,
         reason,
         rms_m,
-        peak_force_n: clips.iter().map(|c| c.replay.peak_force_n).fold(0.0, f64::max),
-        reached_share: clips.iter().map(share).fold(1.0, f64::min),
+        peak_force_n: trusted.iter().map(|c| c.replay.peak_force_n).fold(0.0, f64::max),
+        reached_share: trusted.iter().copied().map(share).fold(1.0, f64::min),
         margin_nats,
         resolves,
         rivals,
         clips,
     }
+}
+
+/// Why the first simulation that blew up is not to be trusted.
+fn blew_up(clips: &[ClipCheck]) -> Option<&str> {
+    clips.iter().find_map(|c| c.replay.untrusted.as_deref())
 }
 
 /// Log odds of a probability, nats; finite, and minus infinity for what is no number.
@@ -464,4 +490,84 @@ pub(crate) fn amount(kind: JointKind, opening: f64) -> String {
 
 fn centimetres(metres: f64) -> String {
     format!("{:.1} cm", 100.0 * metres)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Matrix3;
+
+    use super::*;
+    use crate::twin::{Joint, OrientedBox, Role, Solid};
+
+    /// A drawer's front that slides to -y.
+    fn front() -> Part {
+        let bounds = OrientedBox {
+            center: Point::new(0.0, 0.0, 0.5),
+            half: Vector::new(0.2, 0.1, 0.01),
+            // Right, up, out of the face.
+            rotation: Matrix3::from_columns(&[Vector::x(), Vector::z(), -Vector::y()]),
+        };
+        let handle = Point::new(0.0, -0.03, 0.5);
+        let articulation = Articulation { kind: JointKind::Prismatic, axis: -Vector::y(), origin: handle };
+        let joint = Joint {
+            articulation,
+            upper: 0.4,
+            observed: 0.3,
+            expected: 0.4,
+            probability: None,
+            damping: 1.0,
+            friction: 1.0,
+            resistance_seen: false,
+            balanced: false,
+        };
+        let solid = Solid { name: "front".to_owned(), role: Role::Front, shape: bounds, seen: true };
+        Part { id: "drawer".to_owned(), label: "drawer".to_owned(), joint, solids: vec![solid], handle, bounds }
+    }
+
+    /// A hand's way of 0.3 m, replayed.
+    fn replayed(part: &Part, config: &config::Validation) -> ClipCheck {
+        let path: Vec<Point> =
+            (0..=60).map(|i| part.joint.articulation.motion(0.005 * f64::from(i)) * part.handle).collect();
+        let times_secs = (0..=60).map(|i| f64::from(i) / 30.0).collect();
+        let drive = Drive { times_secs, path, grip: part.handle, back: false };
+        let up = Vector::z();
+        let around = Surroundings::none(&up, 700.0);
+        ClipCheck {
+            clip: "clip".to_owned(),
+            action: Action::Open,
+            observed_range: 0.3,
+            distance_m: 0.0,
+            held_out_rms_m: None,
+            noise_m: 0.0,
+            samples: 8.0,
+            replay: simulate(part, &part.joint.articulation, part.joint.upper, &around, &drive, config).unwrap(),
+            rival: None,
+        }
+    }
+
+    #[test]
+    fn a_simulation_that_blew_up_refutes_nothing() {
+        let config = config::Validation::default();
+        let part = front();
+        let good = replayed(&part, &config);
+        assert_eq!(good.replay.untrusted, None);
+        let mut wild = good.clone();
+        wild.replay.rms_m = 0.3;
+        wild.replay.reached = [0.0, 0.01];
+        let told = |clips: &[&ClipCheck]| {
+            let clips = clips.iter().map(|c| (*c).clone()).collect();
+            judge(&part, clips, Vec::new(), None, &config)
+        };
+        assert_eq!(told(&[&wild]).verdict, Verdict::Fail);
+        wild.replay.untrusted = Some("the handle moved at 90 m/s".to_owned());
+        let check = told(&[&wild]);
+        assert_eq!(check.verdict, Verdict::Undetermined);
+        assert!(
+            check.reason.contains("not to be trusted here, because the handle moved at 90 m/s"),
+            "{}",
+            check.reason
+        );
+        // Beside good ones a bad one costs only itself.
+        assert_eq!(told(&[&good, &wild, &good]).verdict, Verdict::Pass);
+    }
 }

@@ -1,7 +1,7 @@
 //! The rapier world of one moving part: its joint, what stands around it, what it touches. Single precision, relative to the
 //! joint's origin: rooms may lie far from the world's.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use parry3d::query;
 use parry3d::shape::Cuboid;
@@ -16,7 +16,7 @@ use crate::articulation::{Articulation, JointKind};
 use crate::error::{Error, Result};
 use crate::fitting::overlap;
 use crate::math::{Point, Pose, Vector};
-use crate::twin::{OrientedBox, Part, Solid, Twin};
+use crate::twin::{ContactRules, OrientedBox, Part, Solid, Twin};
 
 /// What surrounds a part, world frame, everything closed.
 #[derive(Debug, Clone)]
@@ -29,6 +29,8 @@ pub struct Surroundings<'a> {
     pub up: &'a Vector,
     /// Density of all parts, kg/m^3.
     pub density: f64,
+    /// Which of all solids touch at all; `None` where all do.
+    pub rules: Option<&'a ContactRules>,
 }
 
 /// Solids of two bodies that touched.
@@ -48,12 +50,14 @@ pub struct Contact {
 
 /// Solids nearer than this when closed touch there, metres: models from elsewhere set fronts right onto their carcass.
 const TOUCH_M: f64 = 1e-3;
+/// Shared space that simulators' soft contacts forgive, metres: no obstacle. The moving part is this much smaller all around.
+const FORGIVEN_M: f64 = 1e-4;
 
 impl<'a> Surroundings<'a> {
     /// Nothing but gravity.
     #[must_use]
     pub fn none(up: &'a Vector, density: f64) -> Self {
-        Self { fixed: Vec::new(), movable: Vec::new(), up, density }
+        Self { fixed: Vec::new(), movable: Vec::new(), up, density, rules: None }
     }
 
     /// What the part of `twin.furniture[moving]` can meet on its way. What is out of its reach changes nothing.
@@ -136,7 +140,7 @@ impl Reach {
 }
 
 /// Pairs of colliders between which there are no contacts: (number of the moving solid, number of the other).
-struct Apart(Vec<(u128, u128)>);
+struct Apart(BTreeSet<(u128, u128)>);
 
 impl PhysicsHooks for Apart {
     fn filter_contact_pair(&self, context: &PairFilterContext) -> Option<SolverFlags> {
@@ -155,6 +159,8 @@ pub(super) struct World<'a> {
     origin: Point,
     solids: Vec<&'a Solid>,
     apart: Apart,
+    /// Those of them that share space or touch when closed.
+    overlaps: Vec<(u128, u128)>,
     /// Depth (m), time (s) and impulse (N s) of each pair that touched.
     touched: BTreeMap<(u128, u128), [f64; 3]>,
     dt: f64,
@@ -170,12 +176,14 @@ fn local_pose(shape: &OrientedBox, origin: &Point) -> RapierPose {
 
 impl<'a> World<'a> {
     /// A part on `joint` (which may be a rival of its own) with the limits 0..`upper`, opened by `start`, at rest. Where it
-    /// would stand inside something there, it is opened as far as it can be instead.
+    /// would stand inside something there, it is opened as far as it can be instead. `held` is the inertia that the hand
+    /// adds to the joint, kg m^2 or kg.
     pub(super) fn new(
         part: &'a Part,
         joint: &Articulation,
         upper: f64,
         start: f64,
+        held: f64,
         around: &Surroundings<'a>,
         dt: f64,
     ) -> Result<Self> {
@@ -199,18 +207,24 @@ impl<'a> World<'a> {
             neighbours.push((*neighbour, add(&theirs, false, around.density)));
         }
 
-        let apart = Apart(touching(&solids, part.solids.len(), &origin));
+        let mut overlaps = touching(&solids, part.solids.len(), &origin);
+        let mut apart = Apart(overlaps.iter().copied().collect());
+        if let Some(rules) = around.rules {
+            let off = ruled_apart(&solids, part.solids.len(), rules);
+            overlaps.retain(|pair| !off.contains(pair));
+            apart.0.extend(off);
+        }
         let start = free_start(&solids, part.solids.len(), joint, start, &apart);
-        let body = hang(&mut physics, part, joint, upper, start, &origin, own)?;
+        let body = hang(&mut physics, part, joint, upper, start, held, &origin, own)?;
         let room = physics.insert_body(RigidBodyBuilder::fixed());
         for collider in fixed {
             physics.insert_collider(collider, Some(room));
         }
         for (neighbour, colliders) in neighbours {
             let joint = &neighbour.joint;
-            hang(&mut physics, neighbour, &joint.articulation, joint.upper, 0.0, &origin, colliders)?;
+            hang(&mut physics, neighbour, &joint.articulation, joint.upper, 0.0, 0.0, &origin, colliders)?;
         }
-        Ok(Self { start, physics, body, origin, solids, apart, touched: BTreeMap::new(), dt })
+        Ok(Self { start, physics, body, origin, solids, apart, overlaps, touched: BTreeMap::new(), dt })
     }
 
     /// The part's motion from closed about the joint's origin: how far that point of the part has gone, and the rotation.
@@ -278,7 +292,7 @@ impl<'a> World<'a> {
 
     /// Solids that share space or touch when closed, between which there are no contacts: (of the part, the other).
     pub(super) fn closed_overlaps(&self) -> Vec<[String; 2]> {
-        self.apart.0.iter().map(|(a, b)| [self.name(*a), self.name(*b)]).collect()
+        self.overlaps.iter().map(|(a, b)| [self.name(*a), self.name(*b)]).collect()
     }
 
     /// Whether rapier took a body out because its state was not finite.
@@ -294,7 +308,11 @@ impl<'a> World<'a> {
 /// A solid's collider with its number. Only the moving part meets anything: what stands around it stands apart.
 fn collider(solid: &Solid, number: usize, moves: bool, density: f64, origin: &Point) -> ColliderBuilder {
     let (own, others) = if moves { (Group::GROUP_1, Group::GROUP_2) } else { (Group::GROUP_2, Group::GROUP_1) };
-    let half = solid.shape.half.cast::<f32>();
+    // Of a sheet a tenth at the most is given away, and its weight stays what it is.
+    let shrunk = if moves { solid.shape.half.map(|h| (h - FORGIVEN_M).max(0.9 * h)) } else { solid.shape.half };
+    let volume = shrunk.product();
+    let density = if volume > 0.0 { density * solid.shape.half.product() / volume } else { density };
+    let half = shrunk.cast::<f32>();
     // Boards and fronts of furniture slide on each other more than they stick.
     ColliderBuilder::cuboid(half.x, half.y, half.z)
         .position(local_pose(&solid.shape, origin))
@@ -305,13 +323,15 @@ fn collider(solid: &Solid, number: usize, moves: bool, density: f64, origin: &Po
         .active_hooks(if moves { ActiveHooks::FILTER_CONTACT_PAIRS } else { ActiveHooks::empty() })
 }
 
-/// Puts a part on a joint of one degree of freedom to the world.
+/// Puts a part on a joint of one degree of freedom to the world; `held` is the inertia that a hand adds to the joint.
+#[allow(clippy::too_many_arguments, reason = "a part, its joint and where it hangs")]
 fn hang(
     physics: &mut PhysicsWorld,
     part: &Part,
     joint: &Articulation,
     upper: f64,
     start: f64,
+    held: f64,
     origin: &Point,
     colliders: Vec<ColliderBuilder>,
 ) -> Result<RigidBodyHandle> {
@@ -347,6 +367,7 @@ fn hang(
         // rapier damps angular joints by 0.1 unless told otherwise.
         multibody.damping_mut().fill(part.joint.damping as f32);
         multibody.frictions_mut().fill(part.joint.friction as f32);
+        multibody.armature_mut().fill(held as f32);
         multibody.apply_displacements(&[start as f32]);
         multibody.forward_kinematics(&physics.bodies, false);
         multibody.update_rigid_bodies(&mut physics.bodies, true);
@@ -383,6 +404,19 @@ fn touching(solids: &[&Solid], moving: usize, origin: &Point) -> Vec<(u128, u128
         for (j, (other_pose, other)) in shapes.iter().enumerate().skip(moving) {
             if query::intersection_test(pose, shape, other_pose, other).is_ok_and(|hit| hit.intersecting) {
                 pairs.push((i as u128, j as u128));
+            }
+        }
+    }
+    pairs
+}
+
+/// Numbers of the pairs of a moving solid (the first `moving`) and another between which the model has no contacts.
+fn ruled_apart(solids: &[&Solid], moving: usize, rules: &ContactRules) -> BTreeSet<(u128, u128)> {
+    let mut pairs = BTreeSet::new();
+    for (i, own) in solids.iter().enumerate().take(moving) {
+        for (j, other) in solids.iter().enumerate().skip(moving) {
+            if !rules.meet(&own.name, &other.name) {
+                pairs.insert((i as u128, j as u128));
             }
         }
     }

@@ -18,4 +18,5 @@ mod same_bytes;
 mod simulated;
 mod simulators;
 mod skips;
+mod trajectories;
 mod words;

@@ -6,7 +6,7 @@ use paws_twin::config::Config;
 use paws_twin::hands::{Sample, Trajectory};
 use paws_twin::math::{Point, Vector};
 use paws_twin::report::pictures;
-use paws_twin::twin::{Furniture, Joint, OrientedBox, Part, Role, Solid, Twin};
+use paws_twin::twin::{ContactRule, ContactRules, Furniture, Joint, OrientedBox, Part, Role, Solid, Twin};
 use paws_twin::validation::{Drive, JointCheck, Surroundings, Verdict, simulate, validate};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -391,4 +391,82 @@ fn a_motion_that_begins_inside_something_begins_before_it() {
     assert!(replay.start > 0.1 && replay.start < 1.1, "{}", replay.start);
     assert!(replay.reached[1] < 1.2 && replay.max_m < 1.0, "{:?}", replay.reached);
     assert!(replay.worst_penetration().is_none_or(|(depth, _)| depth < 0.01));
+}
+
+#[test]
+fn a_part_of_grams_follows_the_hand_and_is_not_thrown() {
+    let furniture = door();
+    let part = &furniture.part;
+    let joint = part.joint.articulation;
+    let hand = hand(&joint, 1.2);
+    let drive = Drive {
+        times_secs: hand.samples.iter().map(|s| s.time_secs).collect(),
+        path: hand.positions(),
+        grip: part.handle,
+        back: true,
+    };
+    let up = Vector::z();
+    // 620, 62, 6 and 0.6 g.
+    for density in [100.0, 10.0, 1.0, 0.1] {
+        let around = Surroundings::none(&up, density);
+        let replay = simulate(part, &joint, 1.6, &around, &drive, &Config::default().validation).unwrap();
+        assert_eq!(replay.untrusted, None, "{density}");
+        assert!(replay.rms_m < 0.03, "{density}: {}", replay.rms_m);
+    }
+}
+
+#[test]
+fn a_tenth_of_a_millimetre_is_no_obstacle_and_a_millimetre_is_one() {
+    let furniture = door();
+    let part = &furniture.part;
+    let joint = part.joint.articulation;
+    let hand = hand(&joint, 1.2);
+    let drive = Drive {
+        times_secs: hand.samples.iter().map(|s| s.time_secs).collect(),
+        path: hand.positions(),
+        grip: part.handle,
+        back: false,
+    };
+    let up = Vector::z();
+    // The leaf's outer edge passes 0.498 m from the hinge: a post beyond it, away from the closed leaf, reaches into its way.
+    for (depth, stopped) in [(5e-5, false), (4e-3, true)] {
+        let direction = joint.motion(0.6) * Point::new(1.0, 0.0, 0.35) - joint.motion(0.6) * Point::new(0.0, 0.0, 0.35);
+        let edge = joint.motion(0.6) * Point::new(0.0, 0.0, 0.35) + direction * (0.498f64.hypot(0.018) - depth + 0.02);
+        let along = Matrix3::from_columns(&[direction, Vector::z().cross(&direction), Vector::z()]);
+        let post = OrientedBox { center: edge, half: Vector::new(0.02, 0.002, 0.2), rotation: along };
+        let post = solid("post", Role::Room, post);
+        let around = Surroundings { fixed: vec![&post], ..Surroundings::none(&up, 700.0) };
+        let replay = simulate(part, &joint, 1.6, &around, &drive, &Config::default().validation).unwrap();
+        assert_eq!(replay.reached[1] < 0.8, stopped, "{depth}: {:?}", replay.reached);
+    }
+}
+
+#[test]
+fn what_a_model_excludes_does_not_stand_in_the_way() {
+    let furniture = door();
+    let part = &furniture.part;
+    let joint = part.joint.articulation;
+    let hand = hand(&joint, 1.2);
+    let drive = Drive {
+        times_secs: hand.samples.iter().map(|s| s.time_secs).collect(),
+        path: hand.positions(),
+        grip: part.handle,
+        back: false,
+    };
+    let wall = solid("wall", Role::Room, upright(Point::new(0.25, -0.35, 0.35), Vector::new(0.5, 0.02, 0.5)));
+    let rule = |link: usize, masks: [u32; 2]| ContactRule { link, body: link, masks };
+    let up = Vector::z();
+    for (masks, excluded, free) in
+        [([1, 1], false, false), ([1, 1], true, true), ([2, 2], false, true), ([0, 1], false, false)]
+    {
+        let mut rules = ContactRules::default();
+        rules.solids.insert("front".to_owned(), rule(1, [1, 1]));
+        rules.solids.insert("wall".to_owned(), rule(0, masks));
+        if excluded {
+            rules.excluded.insert([0, 1]);
+        }
+        let around = Surroundings { fixed: vec![&wall], rules: Some(&rules), ..Surroundings::none(&up, 700.0) };
+        let replay = simulate(part, &joint, 1.6, &around, &drive, &Config::default().validation).unwrap();
+        assert_eq!(replay.reached[1] > 1.1, free, "{masks:?} {excluded}: {:?}", replay.reached);
+    }
 }

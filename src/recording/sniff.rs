@@ -1,0 +1,102 @@
+//! What a file is that is no table of numbers: its first bytes tell, and a way out goes with the answer.
+
+/// Bytes that are looked at.
+pub(super) const LOOKED_AT: usize = 4096;
+
+/// What a file that begins so is, and what to do, where it is surely no text table; `None` else.
+pub(super) fn no_table(start: &[u8]) -> Option<String> {
+    const SIGNS: [(&[u8], &str, &str); 9] = [
+        (&[0x1f, 0x8b], "is compressed with gzip", "unpack it with gunzip"),
+        (b"BZh", "is compressed with bzip2", "unpack it with bunzip2"),
+        (&[0xfd, b'7', b'z', b'X', b'Z'], "is compressed with xz", "unpack it with unxz"),
+        (&[0x28, 0xb5, 0x2f, 0xfd], "is compressed with zstd", "unpack it with unzstd"),
+        (b"PK\x03\x04", "is a zip archive (or a spreadsheet)", "unpack it, or save the sheet as CSV"),
+        (&[0xff, 0xfe], "is UTF-16 text", "save it as UTF-8: iconv -f UTF-16 -t UTF-8"),
+        (&[0xfe, 0xff], "is UTF-16 text", "save it as UTF-8: iconv -f UTF-16 -t UTF-8"),
+        (b"\x93NUMPY", "is a NumPy array", "write it with numpy.savetxt"),
+        (b"\x89HDF", "is HDF5", "write the positions as text"),
+    ];
+    if let Some((_, what, way)) = SIGNS.iter().find(|(sign, ..)| start.starts_with(sign)) {
+        return Some(format!("{what}; {way}"));
+    }
+    if start.contains(&0) {
+        return Some("holds zero bytes: it is no text; write the positions as lines of x y z".to_owned());
+    }
+    let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start).trim_ascii_start();
+    let next = |sign: u8| text.strip_prefix(&[sign]).map(|rest| rest.trim_ascii_start().first().copied());
+    if next(b'{').is_some() || next(b'[').is_some_and(|after| matches!(after, Some(b'[' | b'{'))) {
+        return Some("is JSON; write the positions as lines of x y z, with a header for other columns".to_owned());
+    }
+    if next(b'<').is_some() {
+        return Some("is HTML or XML; write the positions as lines of x y z".to_owned());
+    }
+    (!text.contains(&b'\n') && text.contains(&b'\r'))
+        .then(|| "has carriage returns and no line ends; save it with the line ends of Unix or Windows".to_owned())
+}
+
+/// What is odd about a line of a table that is not all numbers, with the way out; empty where nothing is known.
+pub(super) fn hint(line: &str, cells: &[&str]) -> &'static str {
+    if line.starts_with(['[', '(']) {
+        "; leave the brackets out"
+    } else if cells.iter().any(|c| c.contains(':')) {
+        "; time stamps must be seconds"
+    } else if cells.iter().any(|c| c.starts_with("0x") || c.starts_with("-0x")) {
+        "; write numbers as decimals"
+    } else {
+        ""
+    }
+}
+
+/// Whether a line writes its numbers with decimal commas: `0,25;0,5;-0,1`, or the same with white space between.
+pub(super) fn decimal_commas(line: &str) -> bool {
+    let cells: Vec<&str> = if line.contains(';') {
+        line.split(';').map(str::trim).filter(|c| !c.is_empty()).collect()
+    } else {
+        line.split_whitespace().collect()
+    };
+    let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    let number = |cell: &str| match cell.trim_start_matches(['-', '+']).split_once(',') {
+        Some((whole, rest)) => {
+            let mantissa = rest.split(['e', 'E']).next().unwrap_or_default();
+            digits(whole) && digits(mantissa)
+        }
+        None => false,
+    };
+    let whole = |cell: &str| digits(cell.trim_start_matches(['-', '+']));
+    let commas = cells.iter().filter(|c| number(c)).count();
+    cells.len() >= 3 && 2 * commas > cells.len() && cells.iter().all(|c| number(c) || whole(c))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_table_is_named() {
+        for (bytes, word) in [
+            (&b"\x1f\x8b\x08"[..], "gunzip"),
+            (&b"\xff\xfet\0"[..], "UTF-16"),
+            (&b"{\"t\": 0}\n"[..], "JSON"),
+            (&b" [[0, 1, 2]]"[..], "JSON"),
+            (&b"<!doctype html>"[..], "HTML"),
+            (&b"1 2 3\r4 5 6\r"[..], "carriage returns"),
+            (&b"1 2\0 3"[..], "zero bytes"),
+        ] {
+            let said = no_table(bytes).unwrap_or_default();
+            assert!(said.contains(word), "{word}: {said}");
+        }
+        for bytes in [&b"1 2 3\r\n4 5 6\r\n"[..], b"\xef\xbb\xbft,x,y,z\n", b"", b"# {a}\n1 2 3", b"[1, 2, 3]\n"] {
+            assert_eq!(no_table(bytes), None);
+        }
+    }
+
+    #[test]
+    fn decimal_commas_are_told_from_separators() {
+        for line in ["0,5;1,25;-3,0", "0;0,25;-0,1;0,5", "0,250000 -0,030000 0,500000"] {
+            assert!(decimal_commas(line), "{line}");
+        }
+        for line in ["0.5;1.25;3.0", "1, 2, 3", "1,2,3", "0.1,0.2,0.3", "1 2 3", "t;x;y;z", "1;2;3"] {
+            assert!(!decimal_commas(line), "{line}");
+        }
+    }
+}
