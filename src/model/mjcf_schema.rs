@@ -56,7 +56,7 @@ pub(super) struct Row {
 
 static ROWS: LazyLock<BTreeMap<&'static str, Row>> = LazyLock::new(|| {
     let lines = TABLE.lines().filter(|l| !l.starts_with('#'));
-    lines.filter_map(|line| row(line).map(|(name, row)| (name, row))).collect()
+    lines.filter_map(row).collect()
 });
 
 fn row(line: &'static str) -> Option<(&'static str, Row)> {
