@@ -25,6 +25,7 @@ const THINNEST_M: f64 = 1e-3;
 #[must_use]
 pub fn to_twin(model: &Model) -> (Twin, Vec<String>) {
     let mut notes = model.notes.clone();
+    notes.extend(model.unread.iter().cloned());
     let mut twin = Twin {
         name: model.name.chars().filter(|c| !c.is_control()).collect(),
         density_kg_per_m3: DENSITY,

@@ -55,8 +55,8 @@ struct Refusals<'a> {
     mocaps: usize,
 }
 
-/// Kinds that only a simulator's own parts have, or that the file itself must have.
-const ALWAYS_READ: [&str; 5] = ["default", "material", "texture", "hfield", "model"];
+/// Kinds that the file itself must have, whatever is attached to it.
+const ALWAYS_READ: [&str; 4] = ["default", "material", "texture", "hfield"];
 
 impl Refusals<'_> {
     fn fault(&mut self, element: &Element, message: impl std::fmt::Display) {

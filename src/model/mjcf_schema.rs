@@ -172,7 +172,7 @@ fn element(model: &Path, e: &Element, row: &Row, faults: &mut Vec<String>) {
     }
 }
 
-/// What is wrong with an attribute's text. An empty one counts as not written.
+/// What is wrong with an attribute's text. No numbers at all count as not written.
 fn wrong_value(value: &Value, text: &str) -> Option<String> {
     let words: Vec<&str> = text.split_ascii_whitespace().collect();
     match value {
@@ -183,9 +183,7 @@ fn wrong_value(value: &Value, text: &str) -> Option<String> {
             let range = if from == to { from.to_string() } else { format!("{from} to {to}") };
             (!(*from..=*to).contains(&words.len())).then(|| format!("expected {range} numbers"))
         }
-        Value::Words(known) if !text.is_empty() && !known.contains(&text) => {
-            Some(format!("expected one of {}", known.join(", ")))
-        }
+        Value::Words(known) if !known.contains(&text) => Some(format!("expected one of {}", known.join(", "))),
         _ => None,
     }
 }

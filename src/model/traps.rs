@@ -1,12 +1,12 @@
 //! What keeps joints from moving, or hands from moving them, though each of a file's numbers is sound.
 
 use super::check::Said;
+use super::mjcf::WORLD;
 use super::{Format, Kind, Link, Model, ModelJoint, Tree};
 
-/// Free joints that begin elsewhere than in the world.
-pub(super) fn floating(said: &mut Said, model: &Model, tree: Option<&Tree>) {
-    let Some(root) = tree.and_then(|t| t.order.first()).map(|i| &model.links[*i].name) else { return };
-    for joint in model.joints.iter().filter(|j| j.kind == Kind::Free && j.parent != *root) {
+/// Free joints that begin elsewhere than in the world; a URDF's root is a body unless it is named so.
+pub(super) fn floating(said: &mut Said, model: &Model) {
+    for joint in model.joints.iter().filter(|j| j.kind == Kind::Free && j.parent != WORLD) {
         said.fault(format!(
             "{}: floats freely below {}; MuJoCo refuses free joints that do not begin in the world",
             joint.name, joint.parent
