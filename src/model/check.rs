@@ -113,7 +113,7 @@ pub fn model(model: &Model, twin: Option<&Twin>) -> Vec<Point> {
         Err(faults) => (None, faults),
     };
     let mut said = BTreeMap::from([
-        (1, loads(model, broken)),
+        (1, loads(model, tree.as_ref(), broken)),
         (2, limits(model, tree.as_ref())),
         (3, masses(model, tree.as_ref(), twin)),
         (5, names(model, tree.as_ref())),
@@ -151,12 +151,12 @@ pub fn scene(scene: &Scene, twin: Option<&Twin>) -> Vec<Point> {
     points(said)
 }
 
-fn loads(model: &Model, broken: Vec<String>) -> Said {
+fn loads(model: &Model, tree: Option<&Tree>, broken: Vec<String>) -> Said {
     let mut said = Said { concerned: true, faults: broken, ..Said::default() };
     if let Format::Urdf { complaint: Some(complaint), .. } = &model.format {
         said.fault(format!("urdf-rs, and whoever reads with it, refuses the file: {complaint}"));
     }
-    traps::floating(&mut said, model);
+    traps::floating(&mut said, model, tree);
     said
 }
 

@@ -4,9 +4,16 @@ use super::check::Said;
 use super::mjcf::WORLD;
 use super::{Format, Kind, Link, Model, ModelJoint, Tree};
 
-/// Free joints that begin elsewhere than in the world; a URDF's root is a body unless it is named so.
-pub(super) fn floating(said: &mut Said, model: &Model) {
-    for joint in model.joints.iter().filter(|j| j.kind == Kind::Free && j.parent != WORLD) {
+/// Free joints that begin elsewhere than in the world.
+pub(super) fn floating(said: &mut Said, model: &Model, tree: Option<&Tree>) {
+    // Unless it is told to keep links, MuJoCo melts what is fixed to a URDF's root into the world.
+    let melts = matches!(model.format, Format::Urdf { keeps_links: false, .. });
+    let root = tree.and_then(|t| t.order.first().map(|root| (&t.body, root)));
+    let stands = |name: &str| {
+        root.is_some_and(|(body, root)| model.links.iter().zip(body).any(|(l, b)| l.name == name && b == root))
+    };
+    let free = model.joints.iter().filter(|j| j.kind == Kind::Free && j.parent != WORLD);
+    for joint in free.filter(|j| !(melts && stands(&j.parent))) {
         said.fault(format!(
             "{}: floats freely below {}; MuJoCo refuses free joints that do not begin in the world",
             joint.name, joint.parent
