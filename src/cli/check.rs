@@ -52,8 +52,10 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<Answer> {
         }
     }
     print(&if args.json { json::text(&all)? } else { table(&all) })?;
-    let failed = all.iter().flat_map(|c| &c.points).any(|p| p.verdict == Verdict::Fail);
-    Ok(if failed { Answer::No } else { Answer::Yes })
+    // What was not judged is no yes.
+    let is_no = |p: &Point| matches!(p.verdict, Verdict::Fail | Verdict::NotJudged);
+    let no = all.iter().flat_map(|c| &c.points).any(is_no);
+    Ok(if no { Answer::No } else { Answer::Yes })
 }
 
 /// The models right in a folder, by name.
@@ -104,6 +106,7 @@ fn table(all: &[Checked]) -> String {
             match verdict {
                 Some(Verdict::Pass) => "ok",
                 Some(Verdict::Fail) => "FAIL",
+                Some(Verdict::NotJudged) => "?",
                 Some(Verdict::NotApplicable) | None => "-",
             }
             .to_owned()

@@ -11,7 +11,7 @@ use super::glb::Scene;
 use super::masses::masses;
 use super::places::{animations, places, same_places};
 use super::sweep::sweep;
-use super::{Format, Kind, Model, ModelJoint, Shape, Tree};
+use super::{Format, Kind, Model, ModelJoint, Shape, Tree, traps};
 use crate::articulation::JointKind;
 use crate::math::{self, unit};
 use crate::twin::Twin;
@@ -26,6 +26,9 @@ pub enum Verdict {
     Fail,
     /// The file has nothing that the point is about.
     NotApplicable,
+    /// Something that the point is about was not read: nothing speaks against it, and nothing for it.
+    #[serde(rename = "not judged")]
+    NotJudged,
 }
 
 /// A point and what a file says to it.
@@ -66,6 +69,8 @@ const MIN_SLIDE_M: f64 = 1e-3;
 #[derive(Default)]
 pub(super) struct Said {
     pub(super) concerned: bool,
+    /// Whether something that it is about was not looked at.
+    pub(super) unjudged: bool,
     pub(super) faults: Vec<String>,
     pub(super) told: Vec<String>,
 }
@@ -88,11 +93,12 @@ fn points(mut said: BTreeMap<u8, Said>) -> Vec<Point> {
     POINTS
         .into_iter()
         .map(|(id, title)| {
-            let Said { concerned, faults, told } = said.remove(&id).unwrap_or_default();
-            let verdict = match (faults.is_empty(), concerned) {
-                (false, _) => Verdict::Fail,
-                (true, true) => Verdict::Pass,
-                (true, false) => Verdict::NotApplicable,
+            let Said { concerned, unjudged, faults, told } = said.remove(&id).unwrap_or_default();
+            let verdict = match (faults.is_empty(), unjudged, concerned) {
+                (false, ..) => Verdict::Fail,
+                (true, true, _) => Verdict::NotJudged,
+                (true, false, true) => Verdict::Pass,
+                (true, false, false) => Verdict::NotApplicable,
             };
             Point { id, title, verdict, faults, told }
         })
@@ -107,7 +113,7 @@ pub fn model(model: &Model, twin: Option<&Twin>) -> Vec<Point> {
         Err(faults) => (None, faults),
     };
     let mut said = BTreeMap::from([
-        (1, loads(model, broken)),
+        (1, loads(model, tree.as_ref(), broken)),
         (2, limits(model, tree.as_ref())),
         (3, masses(model, tree.as_ref(), twin)),
         (5, names(model, tree.as_ref())),
@@ -118,6 +124,17 @@ pub fn model(model: &Model, twin: Option<&Twin>) -> Vec<Point> {
         said.insert(11, sweep(model, tree));
         if let Some(twin) = twin {
             said.insert(9, same_places(twin, &places(model, tree)));
+        }
+    }
+    for (point, fault) in &model.faults {
+        said.entry(*point).or_default().fault(fault.clone());
+    }
+    if !model.unread.is_empty() {
+        // The points about joints and shapes.
+        for point in [2, 3, 4, 5, 9, 11] {
+            if let Some(said) = said.get_mut(&point) {
+                said.unjudged = true;
+            }
         }
     }
     points(said)
@@ -134,11 +151,12 @@ pub fn scene(scene: &Scene, twin: Option<&Twin>) -> Vec<Point> {
     points(said)
 }
 
-fn loads(model: &Model, broken: Vec<String>) -> Said {
-    let mut said = Said { concerned: true, faults: broken, told: Vec::new() };
+fn loads(model: &Model, tree: Option<&Tree>, broken: Vec<String>) -> Said {
+    let mut said = Said { concerned: true, faults: broken, ..Said::default() };
     if let Format::Urdf { complaint: Some(complaint), .. } = &model.format {
         said.fault(format!("urdf-rs, and whoever reads with it, refuses the file: {complaint}"));
     }
+    traps::floating(&mut said, model, tree);
     said
 }
 
@@ -153,6 +171,7 @@ fn amount(kind: JointKind, value: f64) -> String {
 fn limits(model: &Model, tree: Option<&Tree>) -> Said {
     let mut said = Said::about(model.moving().next().is_some());
     let urdf = matches!(model.format, Format::Urdf { .. });
+    traps::others(&mut said, model);
     for (index, joint) in model.moving() {
         let (name, Some(kind)) = (&joint.name, joint.moves()) else { continue };
         match (joint.lower, joint.upper) {
@@ -193,6 +212,9 @@ fn limits(model: &Model, tree: Option<&Tree>) -> Said {
 
 fn range(said: &mut Said, model: &Model, joint: &ModelJoint, kind: JointKind, [lower, upper]: [f64; 2]) {
     let name = &joint.name;
+    if traps::unlimited(said, model, joint, [lower, upper]) {
+        return;
+    }
     if lower > upper {
         said.fault(format!("{name}: lower limit {lower} is above upper limit {upper}; swap them"));
         return;
@@ -201,14 +223,17 @@ fn range(said: &mut Said, model: &Model, joint: &ModelJoint, kind: JointKind, [l
         said.fault(format!("{name}: limits {lower} to {upper} lock it; widen them, or make it fixed"));
         return;
     }
-    if !(lower..=upper).contains(&0.0) {
+    traps::begins(said, joint);
+    if !(lower..=upper).contains(&joint.start) {
         said.fault(format!(
-            "{name}: 0, where every simulator begins, is outside its limits {lower} to {upper}; move the joint's frame \
-             so that closed is 0"
+            "{name}: {}, where every simulator begins, is outside its limits {lower} to {upper}; move the joint's frame \
+             so that closed is 0",
+            joint.start
         ));
-    } else if lower != 0.0 {
+    } else if lower != joint.start {
         said.tell(format!(
-            "{name}: lower limit {lower}: 0 is not its lower end; closed is taken to be the end nearest to 0"
+            "{name}: lower limit {lower}: {} is not its lower end; closed is taken to be the end nearest to 0",
+            joint.start
         ));
     }
     let opens = upper - lower;
@@ -365,6 +390,7 @@ fn names(model: &Model, tree: Option<&Tree>) -> Said {
         ));
     }
     let Some(tree) = tree else { return said };
+    traps::untouchable(&mut said, model, tree);
     for (index, joint) in model.moving() {
         let Some(child) = tree.carrier.iter().position(|c| *c == Some(index)) else { continue };
         if !model.links[child].between && handle(model, tree, child).is_none() {
@@ -482,6 +508,7 @@ mod tests {
             friction: Some(0.2),
             armature: None,
             limited: Some(true),
+            start: 0.0,
         };
         Model {
             name: "c".to_owned(),
@@ -499,6 +526,8 @@ mod tests {
             ],
             excludes: Vec::new(),
             notes: Vec::new(),
+            unread: Vec::new(),
+            faults: Vec::new(),
         }
     }
 

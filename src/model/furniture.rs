@@ -4,7 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Matrix3;
 
-use super::{Format, Model, ModelJoint, Shape, Tree, check, penetration};
+use super::contacts::Contacts;
+use super::sweep::GRAZE_M;
+use super::{Format, Kind, Model, ModelJoint, Shape, Tree, check, penetration};
 use crate::articulation::{Articulation, JointKind};
 use crate::math::{Point, Pose, Vector, any_orthogonal, centroid, reject, unit};
 use crate::twin::{ContactRule, ContactRules, Furniture, Joint, LeftOut, OrientedBox, Part, Role, Solid, Twin};
@@ -31,6 +33,7 @@ pub fn to_twin(model: &Model) -> (Twin, Vec<String>) {
 #[must_use]
 pub fn to_ruled_twin(model: &Model) -> (Twin, ContactRules, Vec<String>) {
     let mut notes = model.notes.clone();
+    notes.extend(model.unread.iter().cloned());
     let mut twin = Twin {
         name: model.name.chars().filter(|c| !c.is_control()).collect(),
         density_kg_per_m3: DENSITY,
@@ -52,8 +55,9 @@ pub fn to_ruled_twin(model: &Model) -> (Twin, ContactRules, Vec<String>) {
     let mut names = Names::default();
     let (mut mass, mut volume) = (0.0, 0.0);
     let mut built: Vec<(usize, usize)> = Vec::new();
-    for (index, joint) in model.moving() {
-        let id = names.safe(&joint.name);
+    // Joints come first: they are asked for by name, and what else has that name gets another.
+    let ids: Vec<String> = model.moving().map(|(_, j)| names.safe(&j.name)).collect();
+    for ((index, joint), id) in model.moving().zip(ids) {
         let piece = Piece { model, tree: &tree, poses: &poses, index, joint };
         match piece.part(&id, &mut names, &mut notes) {
             Ok((part, base)) => {
@@ -71,6 +75,10 @@ pub fn to_ruled_twin(model: &Model) -> (Twin, ContactRules, Vec<String>) {
             }
             Err(reason) => twin.left_out.push(LeftOut { id, reason }),
         }
+    }
+    for joint in model.joints.iter().filter(|j| j.kind == Kind::Other) {
+        let reason = "it moves in several directions at once; only hinges and slides are replayed".to_owned();
+        twin.left_out.push(LeftOut { id: names.safe(&joint.name), reason });
     }
     if mass > 0.0 && volume > 0.0 && mass.is_finite() {
         twin.density_kg_per_m3 = mass / volume;
@@ -344,8 +352,9 @@ fn bounds(solids: &[Solid], corners: &[Point], joint: &Articulation, handle: &Po
     OrientedBox { center: Point::from(rotation * ((low + high) * 0.5)), half: (high - low) * 0.5, rotation }
 }
 
-/// Gives the boards that parts hang on to the nearest of those parts, and the rest to the room. A board that stands inside another part would hold
-/// that part fast in a simulation: it is left out.
+/// Gives the boards that parts hang on to the nearest of those parts, and the rest to the room. A board that stands inside
+/// another part would hold that part fast in a simulation: it is left out. So is one that a part goes through because the
+/// file switches their contacts off.
 fn boards(
     model: &Model,
     tree: &Tree,
@@ -361,7 +370,8 @@ fn boards(
             *slot |= inside;
         }
     }
-    let mut left = 0;
+    let contacts = Contacts::of(model, tree);
+    let (mut left, mut passed) = (0, 0);
     for (i, link) in model.links.iter().enumerate().filter(|(i, _)| !moves[*i]) {
         // The joints that hang on this very link, else on what is fixed to it.
         let on = |is: &dyn Fn(usize) -> bool| -> Vec<usize> {
@@ -386,6 +396,16 @@ fn boards(
                 left += 1;
                 continue;
             }
+            let mut parts = built.iter().zip(&twin.furniture);
+            let passes = parts.any(|((index, _), f)| {
+                let inside = tree.beyond(*index);
+                let passage = Passage { model, poses, inside: &inside, part: &f.part };
+                passage.is_through(&board, |l, s| contacts.off(l, i) || !s.meets(shape))
+            });
+            if passes {
+                passed += 1;
+                continue;
+            }
             let wanted = shape.name.clone().unwrap_or_else(|| format!("{}_{k}", link.name));
             let name = names.solid(&wanted, shape, i, tree);
             if is_room {
@@ -399,6 +419,39 @@ fn boards(
         notes.push(format!(
             "{left} boards (or boxes around meshes) share space with a part when closed and are left out"
         ));
+    }
+    if passed > 0 {
+        notes.push(format!(
+            "{passed} boards that a part goes through, as the file switches their contacts off, are left out"
+        ));
+    }
+}
+
+/// A part on its way, from closed to open.
+struct Passage<'a> {
+    model: &'a Model,
+    poses: &'a [Pose],
+    /// For each link whether it moves with the part.
+    inside: &'a [bool],
+    part: &'a Part,
+}
+
+impl Passage<'_> {
+    /// Whether the part, closed or on its way, stands in a board with a shape of a link that `slips` past it.
+    fn is_through(&self, board: &OrientedBox, slips: impl Fn(usize, &Shape) -> bool) -> bool {
+        // Poses over the range: a door's edge comes no farther than a board is thick between two of them.
+        const POSES: u32 = 24;
+        let joint = &self.part.joint;
+        let links = self.model.links.iter().enumerate().filter(|(l, _)| self.inside[*l]);
+        links.flat_map(|(l, link)| solid_shapes(link).into_iter().map(move |s| (l, s))).any(|(l, shape)| {
+            slips(l, shape) && {
+                let closed = shape.bounds.moved(&self.poses[l]);
+                (0..=POSES).any(|i| {
+                    let opening = joint.upper * f64::from(i) / f64::from(POSES);
+                    penetration(&closed.moved(&joint.articulation.motion(opening)), board) > GRAZE_M
+                })
+            }
+        })
     }
 }
 

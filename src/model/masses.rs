@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::check::Said;
-use super::{Link, MassSource, Model, Tree};
+use super::{Format, Link, MassSource, Model, Tree};
 use crate::math::Vector;
 use crate::twin::{Twin, mass_properties};
 
@@ -27,7 +27,17 @@ pub(super) fn masses(model: &Model, tree: Option<&Tree>, twin: Option<&Twin>) ->
         if link.between || frame_only || (Some(i) == root && name == super::mjcf::WORLD) {
             continue;
         }
+        // MuJoCo takes bodies without joints, and what is fixed to them, as parts of the world: no force moves them.
+        let stands =
+            tree.is_some_and(|t| t.body.get(i).copied() == root) && matches!(model.format, Format::Mjcf { .. });
+        if stands && (link.mass_source != MassSource::Stated || link.inertia.iter().all(|m| *m == 0.0)) {
+            continue;
+        }
         said.concerned = true;
+        if stands {
+            moments_of(&mut said, link);
+            continue;
+        }
         match (link.mass_source, link.mass) {
             (MassSource::Nothing, _) => said.fault(format!("{name}: no <inertial>; write mass, centre and inertia")),
             (MassSource::Assumed, _) => said.fault(format!(
@@ -64,11 +74,28 @@ fn mass_of(said: &mut Said, link: &Link, mass: f64, is_furniture: bool) {
     if !(MIN_MASS_KG..=MAX_MASS_KG).contains(&mass) && (is_furniture || mass.is_nan() || mass <= 0.0) {
         said.fault(format!("{name}: {mass} kg; furniture's parts weigh {MIN_MASS_KG} to {MAX_MASS_KG} kg"));
     }
+    if !moments_of(said, link) || link.shapes.is_empty() || link.incomplete {
+        return;
+    }
+    let corners: Vec<Vector> = link.shapes.iter().flat_map(|s| s.bounds.corners()).map(|p| p.coords).collect();
+    let (mut low, mut high) = (corners[0], corners[0]);
+    for c in &corners {
+        (low, high) = (low.inf(c), high.sup(c));
+    }
+    let outside = (0..3).map(|k| (low[k] - link.center[k]).max(link.center[k] - high[k])).fold(0.0, f64::max);
+    if outside > 1e-6 {
+        said.fault(format!("{name}: its centre of mass lies {:.1} mm outside its boxes", 1000.0 * outside));
+    }
+}
+
+/// Says what no body has as moments of inertia; false where they are beyond all numbers.
+fn moments_of(said: &mut Said, link: &Link) -> bool {
     // Above every body, and where eigenvalues are no numbers any more.
     const MAX_MOMENT: f64 = 1e9;
+    let name = &link.name;
     if !link.inertia.iter().all(|x| x.abs() < MAX_MOMENT) {
         said.fault(format!("{name}: its moments of inertia are beyond any body's"));
-        return;
+        return false;
     }
     let mut moments: Vec<f64> = link.inertia.symmetric_eigenvalues().iter().copied().collect();
     moments.sort_by(f64::total_cmp);
@@ -84,16 +111,5 @@ fn mass_of(said: &mut Said, link: &Link, mass: f64, is_furniture: bool) {
             ));
         }
     }
-    if link.shapes.is_empty() || link.incomplete {
-        return;
-    }
-    let corners: Vec<Vector> = link.shapes.iter().flat_map(|s| s.bounds.corners()).map(|p| p.coords).collect();
-    let (mut low, mut high) = (corners[0], corners[0]);
-    for c in &corners {
-        (low, high) = (low.inf(c), high.sup(c));
-    }
-    let outside = (0..3).map(|k| (low[k] - link.center[k]).max(link.center[k] - high[k])).fold(0.0, f64::max);
-    if outside > 1e-6 {
-        said.fault(format!("{name}: its centre of mass lies {:.1} mm outside its boxes", 1000.0 * outside));
-    }
+    true
 }

@@ -1,32 +1,37 @@
 //! MJCF, as far as furniture needs it.
 //!
-//! Read: `compiler` (angle, autolimits, eulerseq, meshdir, assetdir, inertiafromgeom), nested `default` classes of joints,
-//! geoms, sites and meshes, `include`, `body` and `frame` with every orientation (quat, axisangle, euler, xyaxes, zaxis),
-//! hinges and slides (axis, pos, range, limited, damping, frictionloss, armature, actuatorfrcrange), free joints, geoms
-//! (box, sphere, ellipsoid, cylinder, capsule, fromto, OBJ and STL meshes), inertial, sites, `contact/exclude`. Planes are
-//! passed over: nothing of a piece of furniture is endless. A body with several joints becomes a chain of links.
+//! Read: `compiler` (angle, autolimits, eulerseq, meshdir, assetdir, strippath, inertiafromgeom, inertiagrouprange,
+//! settotalmass), nested `default` classes, `include`, `body`, `frame` and `replicate` with every orientation (quat,
+//! axisangle, euler, xyaxes, zaxis), hinges and slides (axis, pos, range, limited, ref, damping, frictionloss, armature,
+//! actuatorfrcrange), free joints, geoms (box, sphere, ellipsoid, cylinder, capsule, fromto, OBJ and STL meshes with scale,
+//! refpos and refquat), inertial, sites, `contact/exclude`, and equalities that hold a joint fast. Planes are passed over:
+//! nothing of a piece of furniture is endless. A body with several joints becomes a chain of links.
 //!
-//! Listed in the notes as not read: actuators, tendons, equalities, contact pairs, composites, flexes, attachments, height
-//! fields, plugins, and files outside the model's folder.
+//! What MuJoCo refuses is in [`Model::faults`]. Attachments, composites and flexes may hide joints: [`Model::unread`].
+//! Listed in the notes as not read: springs, actuators, tendons, other equalities, contact pairs, height fields, plugins.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use nalgebra::Matrix3;
 
-use super::mjcf_context::{Context, Includes, Resolved, from_z};
-use super::shapes::Primitive;
+use super::mjcf_context::{Context, Resolved};
+use super::mjcf_tree::{Copies, Includes};
 use super::xml::{self, Element};
-use super::{Format, Kind, Link, MassSource, Model, ModelJoint, Shape, bounded, mesh, named};
+use super::{
+    Format, Kind, Link, MassSource, Model, ModelJoint, bounded, mjcf_assets, mjcf_equality, mjcf_refusals, mjcf_schema,
+    named,
+};
 use crate::error::Result;
-use crate::math::{Point, Pose, Vector, unit};
+use crate::math::{Point, Pose, Vector};
 
 /// The body that everything stands in.
 pub const WORLD: &str = "world";
-/// MuJoCo's default density: that of water, kg/m^3.
-const WATER: f64 = 1000.0;
 
-/// Reads a file with everything that it includes from its own folder.
+/// Elements of a body that make joints or shapes of their own.
+const HIDING: [&str; 3] = ["attach", "composite", "flexcomp"];
+
+/// Reads a file with everything that it includes, wherever that lies.
 ///
 /// # Errors
 /// Where a file cannot be read, is no MJCF, or holds what no model can.
@@ -40,56 +45,28 @@ pub(super) fn from_element(path: &Path, mut root: Element) -> Result<Model> {
     if root.name != "mujoco" {
         return Err(root.error("expected <mujoco>, the outermost element of an MJCF"));
     }
-    let mut out = Builder {
-        model: Model {
-            name: named(root.get("model"), path),
-            source: path.to_owned(),
-            format: Format::Mjcf { radian: false },
-            links: Vec::new(),
-            joints: Vec::new(),
-            excludes: Vec::new(),
-            notes: Vec::new(),
-        },
-        portions: Vec::new(),
-        taken: BTreeSet::new(),
-        made: BTreeMap::new(),
-        unread: BTreeMap::new(),
-        measured: BTreeMap::new(),
-    };
-    let mut included = Includes { dir: path.parent().unwrap_or(Path::new("")).to_owned(), read: BTreeSet::new() };
-    included.read.extend(path.canonicalize().ok());
-    included.expand(&mut root, 0, &mut out.model.notes)?;
-    let context = Context::read(&root)?;
-    out.model.format = Format::Mjcf { radian: context.radian };
-    names(&root, &mut out.taken);
-    out.link(WORLD.to_owned());
+    let mut included = Includes { model: path, read: path.canonicalize().into_iter().collect(), missing: Vec::new() };
+    included.expand(&mut root, 0)?;
+    let context = Context::read(path, &root)?;
+    let mut refused: Vec<String> = included.missing.iter().map(|m| format!("{m}; MuJoCo refuses the model")).collect();
+    refused.extend(mjcf_schema::violations(path, &root));
+    refused.extend(mjcf_assets::missing(path, &root, &context.folders));
+    let mut copies = Copies::default();
+    copies.expand(&context, &mut root)?;
+    let mut out = Builder::new(path, &root);
+    out.model.unread = included.missing;
     for section in &root.children {
-        match section.name.as_str() {
-            "worldbody" => out.contents(&context, section, 0, &Pose::identity(), None)?,
-            "contact" => {
-                for child in &section.children {
-                    match (child.name.as_str(), child.get("body1"), child.get("body2")) {
-                        ("exclude", Some(a), Some(b)) => out.model.excludes.push([a.to_owned(), b.to_owned()]),
-                        ("exclude", ..) => return Err(child.error("needs body1 and body2")),
-                        (other, ..) => out.pass_over(other),
-                    }
-                }
-            }
-            "option" => {
-                let along_z = |g: &[f64; 3]| g[0] == 0.0 && g[1] == 0.0 && g[2] <= 0.0;
-                if section.numbers::<3>("gravity")?.is_some_and(|g| !along_z(&g)) {
-                    out.model.notes.push("gravity does not point along -z; it is taken to".to_owned());
-                }
-            }
-            // Read before, or without a say in shapes and joints.
-            "compiler" | "default" | "size" | "visual" | "statistic" | "keyframe" | "sensor" | "custom" => {}
-            "asset" => section.all("hfield").for_each(|_| out.pass_over("hfield")),
-            other => out.pass_over(other),
-        }
+        out.section(&context, section, &copies)?;
     }
     out.finish(&context);
     bounded(&out.model)?;
-    Ok(out.model)
+    let mut model = out.model;
+    model.format = Format::Mjcf { radian: context.radian || !(out.angles || turned(&root)) };
+    refused.extend(mjcf_refusals::refusals(&context, &root, &copies, &model));
+    refused.truncate(mjcf_schema::MAX_FAULTS);
+    model.faults.extend(refused.into_iter().map(|f| (1, f)));
+    mjcf_equality::read(&context, &root, &mut model);
+    Ok(model)
 }
 
 /// All names that elements have.
@@ -98,34 +75,76 @@ fn names(element: &Element, taken: &mut BTreeSet<String>) {
     element.children.iter().for_each(|c| names(c, taken));
 }
 
-/// What one shape adds to its link's mass.
-struct Portion {
-    /// kg; `None` for a mesh, whose volume is not known.
-    mass: Option<f64>,
-    center: Point,
-    /// Link axes, kg m^2.
-    inertia: Matrix3<f64>,
-    /// Neither mass nor density is written.
-    assumed: bool,
+/// Whether an orientation is written as an angle that is not 0.
+fn turned(element: &Element) -> bool {
+    let is_angle = |text: &str| text.split_ascii_whitespace().any(|w| w.parse::<f64>().is_ok_and(|v| v != 0.0));
+    ["euler", "axisangle"].into_iter().filter_map(|a| element.get(a)).any(is_angle)
+        || element.children.iter().any(turned)
 }
 
-struct Builder {
-    model: Model,
+/// What one shape adds to its link's mass.
+pub(super) struct Portion {
+    /// kg; `None` for a mesh, whose volume is not known.
+    pub(super) mass: Option<f64>,
+    pub(super) center: Point,
+    /// Link axes, kg m^2.
+    pub(super) inertia: Matrix3<f64>,
+    /// Neither mass nor density is written.
+    pub(super) assumed: bool,
+}
+
+/// A model in the making.
+pub(super) struct Builder {
+    pub(super) model: Model,
     /// For each link what its shapes weigh.
-    portions: Vec<Vec<Portion>>,
+    pub(super) portions: Vec<Vec<Portion>>,
     /// Names that must not be made up.
     taken: BTreeSet<String>,
     /// How many names were made up for each wish.
     made: BTreeMap<String, usize>,
     /// Elements that are not read, and how many.
-    unread: BTreeMap<String, usize>,
+    passed: BTreeMap<String, usize>,
     /// Bounds of meshes by name, or why there are none.
-    measured: BTreeMap<String, std::result::Result<[Point; 2], String>>,
+    pub(super) measured: BTreeMap<String, std::result::Result<[Point; 2], String>>,
+    /// Whether a joint's range or reference is an angle.
+    angles: bool,
+    /// Geoms that a `<pair>` lets touch whatever their masks are.
+    paired: BTreeSet<String>,
+    /// The file switches all contacts off.
+    untouching: bool,
 }
 
 impl Builder {
-    fn pass_over(&mut self, name: &str) {
-        *self.unread.entry(xml::brief(name)).or_default() += 1;
+    fn new(path: &Path, root: &Element) -> Self {
+        let mut taken = BTreeSet::new();
+        names(root, &mut taken);
+        let mut out = Self {
+            model: Model {
+                name: named(root.get("model"), path),
+                source: path.to_owned(),
+                format: Format::Mjcf { radian: false },
+                links: Vec::new(),
+                joints: Vec::new(),
+                excludes: Vec::new(),
+                notes: Vec::new(),
+                unread: Vec::new(),
+                faults: Vec::new(),
+            },
+            portions: Vec::new(),
+            taken,
+            made: BTreeMap::new(),
+            passed: BTreeMap::new(),
+            measured: BTreeMap::new(),
+            angles: false,
+            paired: BTreeSet::new(),
+            untouching: false,
+        };
+        out.link(WORLD.to_owned());
+        out
+    }
+
+    pub(super) fn pass_over(&mut self, name: &str) {
+        *self.passed.entry(xml::brief(name)).or_default() += 1;
     }
 
     /// A name that nothing has yet.
@@ -147,6 +166,55 @@ impl Builder {
         self.model.links.push(Link::named(name));
         self.portions.push(Vec::new());
         self.model.links.len() - 1
+    }
+
+    /// One of the elements right in `<mujoco>`.
+    fn section(&mut self, c: &Context, section: &Element, copies: &Copies) -> Result<()> {
+        match section.name.as_str() {
+            "worldbody" => self.contents(c, section, 0, &Pose::identity(), None)?,
+            "contact" => section.children.iter().for_each(|child| self.contact(child, copies)),
+            "option" => self.option(section)?,
+            // Read elsewhere, or without a say in shapes and joints.
+            "compiler" | "default" | "size" | "visual" | "statistic" | "keyframe" | "sensor" | "custom"
+            | "equality" => {}
+            "asset" => section.all("hfield").for_each(|_| self.pass_over("hfield")),
+            other => self.pass_over(other),
+        }
+        Ok(())
+    }
+
+    fn contact(&mut self, element: &Element, copies: &Copies) {
+        let both = |a: &str, b: &str| element.get(a).zip(element.get(b)).map(|(a, b)| (copies.of(a), copies.of(b)));
+        match (element.name.as_str(), both("body1", "body2"), both("geom1", "geom2")) {
+            ("exclude", Some((first, second)), _) => {
+                for a in &first {
+                    self.model.excludes.extend(second.iter().map(|b| [a.clone(), b.clone()]));
+                }
+            }
+            // Without both the file is refused, which is said elsewhere.
+            ("exclude", None, _) => {}
+            (other, _, geoms) => {
+                self.paired.extend(geoms.into_iter().flat_map(|(a, b)| a.into_iter().chain(b)));
+                self.pass_over(other);
+            }
+        }
+    }
+
+    fn option(&mut self, element: &Element) -> Result<()> {
+        let along_z = |g: &[f64; 3]| g[0] == 0.0 && g[1] == 0.0 && g[2] <= 0.0;
+        if element.numbers::<3>("gravity")?.is_some_and(|g| !along_z(&g)) {
+            self.model.notes.push("gravity does not point along -z; it is taken to".to_owned());
+        }
+        for flag in element.all("flag") {
+            let off = |what: &str| flag.get(what) == Some("disable");
+            self.untouching |= off("contact") || off("constraint");
+            if off("filterparent") {
+                let note =
+                    "contacts between parents and children are switched on (filterparent); they are not looked at";
+                self.model.notes.push(note.to_owned());
+            }
+        }
+        Ok(())
     }
 
     /// Everything in a body, or in a frame of it at `place`.
@@ -173,7 +241,13 @@ impl Builder {
                 }
                 // Read with the body.
                 "joint" | "freejoint" | "inertial" | "camera" | "light" => {}
-                other => self.pass_over(other),
+                other => {
+                    if HIDING.contains(&other) {
+                        let at = mjcf_schema::place(&self.model.source, child);
+                        self.model.unread.push(format!("{at}: its joints and shapes are not read"));
+                    }
+                    self.pass_over(other);
+                }
             }
         }
         Ok(())
@@ -195,7 +269,9 @@ impl Builder {
         let mut above = self.model.links[parent].name.clone();
         for (i, mut joint) in joints.into_iter().enumerate() {
             let below = if i == last { name.clone() } else { self.free_name(&format!("{name}_between_{}", i + 1)) };
-            joint.parent_from_child = if i == 0 { pose } else { Pose::identity() };
+            let shown = if i == 0 { pose } else { Pose::identity() };
+            // The file shows the joint where it begins.
+            joint.parent_from_child = if joint.start == 0.0 { shown } else { shown * joint.motion(-joint.start) };
             joint.parent = std::mem::replace(&mut above, below.clone());
             joint.child = below.clone();
             self.model.joints.push(joint);
@@ -204,8 +280,14 @@ impl Builder {
         }
         let link = self.model.links.len() - 1;
         self.contents(c, element, link, &Pose::identity(), class)?;
-        let Some(inertial) = element.child("inertial").filter(|_| c.from_shapes != Some(true)) else { return Ok(()) };
-        let r = Resolved { element: inertial, class: None };
+        match element.child("inertial").filter(|_| c.from_shapes != Some(true)) {
+            Some(inertial) => self.inertial(c, inertial, link),
+            None => Ok(()),
+        }
+    }
+
+    fn inertial(&mut self, c: &Context, element: &Element, link: usize) -> Result<()> {
+        let r = Resolved { element, class: None };
         let at = c.pose(&r)?;
         let turn = at.rotation.to_rotation_matrix();
         let own = match (r.numbers("fullinertia", 6..=6)?, r.numbers("diaginertia", 3..=3)?) {
@@ -239,7 +321,15 @@ impl Builder {
                 "freejoint" => out.push(blank(self.name_of(child, "free")?, Kind::Free)),
                 "joint" => {
                     let name = self.name_of(child, "joint")?;
-                    out.push(joint(c, &c.resolved(child, class)?, name, place)?);
+                    let r = c.resolved(child, class)?;
+                    let made = joint(c, &r, name, place)?;
+                    let turns = matches!(made.kind, Kind::Revolute | Kind::Other);
+                    self.angles |= turns && ["range", "ref", "springref"].into_iter().any(|a| r.get(a).is_some());
+                    if let Some(spring) = spring(&r)? {
+                        let name = &made.name;
+                        self.model.notes.push(format!("{name}: its spring ({spring}) is not read: none is simulated"));
+                    }
+                    out.push(made);
                 }
                 _ => {}
             }
@@ -247,104 +337,74 @@ impl Builder {
         Ok(())
     }
 
-    fn geom(&mut self, c: &Context, r: &Resolved, link: usize, place: &Pose) -> Result<()> {
-        let kind = r.get("type").unwrap_or("sphere");
-        let name = r.element.get("name").map(|_| r.element.own_name()).transpose()?;
-        if kind == "plane" {
-            return Ok(());
-        }
-        let mut pose = c.pose(r)?;
-        let primitive = if let Some(mesh) = r.get("mesh") {
-            let owner = self.model.links[link].name.clone();
-            let Some((file, scale)) = c.meshes.get(mesh) else {
-                return Err(r.element.error(format!("there is no mesh \"{}\" in <asset>", xml::brief(mesh))));
-            };
-            let (source, folders) = (&self.model.source, &c.folders);
-            let bounds = self.measured.entry(mesh.to_owned()).or_insert_with(|| {
-                let found = mesh::find(source, folders, file);
-                mesh::bounds(&found.ok_or_else(|| "there is no such file beside the model".to_owned())?)
-            });
-            let at = &mut self.model.links[link];
-            at.meshes.push(mesh.to_owned());
-            at.collides_as_mesh |= kind == "mesh" && masks(r)? != [0, 0];
-            match bounds {
-                Ok([low, high]) => {
-                    let ends = [low.coords.component_mul(scale), high.coords.component_mul(scale)];
-                    Primitive::Mesh([ends[0].inf(&ends[1]).into(), ends[0].sup(&ends[1]).into()])
-                }
-                Err(why) => {
-                    at.incomplete = true;
-                    self.model.notes.push(format!("{owner}: mesh {} is not read: {why}", xml::brief(mesh)));
-                    self.portions[link].push(Portion {
-                        mass: None,
-                        center: Point::origin(),
-                        inertia: Matrix3::zeros(),
-                        assumed: r.get("mass").or(r.get("density")).is_none(),
-                    });
-                    return Ok(());
-                }
-            }
-        } else {
-            match sized(r, kind, &mut pose)? {
-                Some(primitive) => primitive,
-                None => {
-                    self.pass_over(&format!("geom of type {kind}"));
-                    return Ok(());
-                }
-            }
-        };
-        let pose = place * pose;
-        let bounds = primitive.bounds(&pose);
-        let masks = masks(r)?;
-        let (mass, density) = (r.number("mass")?, r.number("density")?);
-        let mass_of = |volume: f64| density.unwrap_or(WATER) * volume;
-        let weighs = mass.or_else(|| primitive.volume().map(mass_of)).or((density == Some(0.0)).then_some(0.0));
-        let turn = pose.rotation.to_rotation_matrix();
-        let moments = weighs.and_then(|m| primitive.moments(m));
-        let own = moments.map_or(Matrix3::zeros(), |m| Matrix3::from_diagonal(&m));
-        if weighs != Some(0.0) {
-            self.portions[link].push(Portion {
-                mass: weighs.filter(|_| moments.is_some()),
-                center: bounds.center,
-                inertia: turn.matrix() * own * turn.matrix().transpose(),
-                assumed: mass.or(density).is_none(),
-            });
-        }
-        let visual = masks == [0, 0];
-        self.model.links[link].shapes.push(Shape { name, bounds, exact: primitive.is_box(), visual, masks });
-        Ok(())
-    }
-
-    /// Masses that no `<inertial>` states, and the notes.
+    /// Masses that no `<inertial>` states, contacts of the whole file, and the notes.
     fn finish(&mut self, c: &Context) {
         for (link, portions) in self.model.links.iter_mut().zip(&self.portions) {
-            if link.mass_source == MassSource::Stated
-                || link.name == WORLD
-                || portions.is_empty()
-                || c.from_shapes == Some(false)
-            {
-                continue;
+            let stated = link.mass_source == MassSource::Stated || c.from_shapes == Some(false);
+            if !stated && link.name != WORLD && !portions.is_empty() {
+                weigh(link, portions);
             }
-            let assumed = portions.iter().any(|p| p.assumed);
-            link.mass_source = if assumed { MassSource::Assumed } else { MassSource::Shapes };
-            let Some(masses) = portions.iter().map(|p| p.mass).collect::<Option<Vec<f64>>>() else { continue };
-            let total: f64 = masses.iter().sum();
-            if total <= 0.0 {
-                continue;
-            }
-            let moment = portions.iter().zip(&masses).fold(Vector::zeros(), |s, (p, m)| s + p.center.coords * *m);
-            let center = Point::from(moment / total);
-            let mut inertia = Matrix3::zeros();
-            for (p, m) in portions.iter().zip(&masses) {
-                let d = p.center - center;
-                inertia += p.inertia + (Matrix3::identity() * d.norm_squared() - d * d.transpose()) * *m;
-            }
-            (link.mass, link.center, link.inertia) = (Some(total), center, inertia);
         }
-        for (name, count) in &self.unread {
+        if let Some(total) = c.total {
+            self.scale(total);
+        }
+        for link in &mut self.model.links {
+            link.collides_as_mesh &= !self.untouching;
+            for shape in &mut link.shapes {
+                let paired = shape.name.as_ref().is_some_and(|n| self.paired.contains(n));
+                shape.visual = self.untouching || (shape.visual && !paired);
+            }
+        }
+        for (name, count) in &self.passed {
             self.model.notes.push(format!("not read: {count} x <{name}>"));
         }
     }
+
+    /// Makes all bodies together weigh `total`, kg.
+    fn scale(&mut self, total: f64) {
+        let weighing = self.model.links.iter().filter(|l| l.mass_source != MassSource::Nothing);
+        let sum = weighing.map(|l| l.mass).sum::<Option<f64>>().filter(|s| *s > 0.0);
+        let Some(sum) = sum else {
+            self.model.notes.push("settotalmass is not read, as not all masses are known".to_owned());
+            return;
+        };
+        for link in &mut self.model.links {
+            link.mass = link.mass.map(|m| m * total / sum);
+            link.inertia *= total / sum;
+        }
+    }
+}
+
+/// A link's mass, centre and inertia from its shapes, where all of these are known.
+fn weigh(link: &mut Link, portions: &[Portion]) {
+    let assumed = portions.iter().any(|p| p.assumed);
+    link.mass_source = if assumed { MassSource::Assumed } else { MassSource::Shapes };
+    let Some(masses) = portions.iter().map(|p| p.mass).collect::<Option<Vec<f64>>>() else { return };
+    let total: f64 = masses.iter().sum();
+    if total <= 0.0 {
+        return;
+    }
+    let moment = portions.iter().zip(&masses).fold(Vector::zeros(), |s, (p, m)| s + p.center.coords * *m);
+    let center = Point::from(moment / total);
+    let mut inertia = Matrix3::zeros();
+    for (p, m) in portions.iter().zip(&masses) {
+        let d = p.center - center;
+        inertia += p.inertia + (Matrix3::identity() * d.norm_squared() - d * d.transpose()) * *m;
+    }
+    (link.mass, link.center, link.inertia) = (Some(total), center, inertia);
+}
+
+/// A joint's spring in words.
+fn spring(r: &Resolved) -> Result<Option<String>> {
+    let first = |attribute: &str| -> Result<f64> {
+        Ok(r.numbers(attribute, 1..=8)?.and_then(|v| v.first().copied()).unwrap_or(0.0))
+    };
+    let (stiffness, rest) = (first("stiffness")?, first("springref")?);
+    if stiffness != 0.0 {
+        return Ok(Some(format!("stiffness {stiffness}, at rest at {rest}")));
+    }
+    let timed = r.numbers("springdamper", 2..=2)?.is_some_and(|v| v.iter().all(|x| *x > 0.0));
+    Ok(timed.then(|| "springdamper".to_owned()))
 }
 
 fn blank(name: String, kind: Kind) -> ModelJoint {
@@ -364,6 +424,7 @@ fn blank(name: String, kind: Kind) -> ModelJoint {
         friction: None,
         armature: None,
         limited: None,
+        start: 0.0,
     }
 }
 
@@ -391,6 +452,9 @@ fn joint(c: &Context, r: &Resolved, name: String, place: &Pose) -> Result<ModelJ
         let value = range.as_ref().and_then(|v| v.get(i)).copied();
         if kind == Kind::Revolute { value.map(|v| c.angle(v)) } else { value }
     };
+    // Balls and free joints begin where the file has them.
+    let moves = matches!(kind, Kind::Revolute | Kind::Prismatic);
+    let reference = r.number("ref")?.filter(|_| moves).unwrap_or(0.0);
     // Later versions of the format take polynomials; the first number is the linear term.
     let linear =
         |attribute: &str| -> Result<Option<f64>> { Ok(r.numbers(attribute, 1..=8)?.and_then(|v| v.first().copied())) };
@@ -404,50 +468,9 @@ fn joint(c: &Context, r: &Resolved, name: String, place: &Pose) -> Result<ModelJ
         friction: r.number("frictionloss")?,
         armature: r.number("armature")?,
         limited,
+        start: if kind == Kind::Revolute { c.angle(reference) } else { reference },
         ..blank(name, kind)
     })
-}
-
-/// `contype` and `conaffinity`; both are 1 unless the file says otherwise.
-fn masks(r: &Resolved) -> Result<[u32; 2]> {
-    let mask = |attribute: &str| -> Result<u32> {
-        // Masks are whole numbers of 32 bits; what is outside meets everything.
-        Ok(r.number(attribute)?
-            .map_or(1, |v| if (0.0..=f64::from(u32::MAX)).contains(&v) { v as u32 } else { u32::MAX }))
-    };
-    Ok([mask("contype")?, mask("conaffinity")?])
-}
-
-/// A geom's solid from `type`, `size` and `fromto`; `None` for types that are not read. `fromto` replaces the pose.
-fn sized(r: &Resolved, kind: &str, pose: &mut Pose) -> Result<Option<Primitive>> {
-    if !["box", "sphere", "ellipsoid", "cylinder", "capsule"].contains(&kind) {
-        return Ok(None);
-    }
-    let mut size = r.numbers("size", 1..=3)?.unwrap_or_default();
-    if let Some(ends) = r.numbers("fromto", 6..=6)?.filter(|_| kind != "sphere") {
-        let (a, b) = (Vector::from_row_slice(&ends[..3]), Vector::from_row_slice(&ends[3..]));
-        let along = unit(&(b - a)).ok_or_else(|| r.element.error("fromto: both ends are the same point"))?;
-        *pose = Pose::from_parts(((a + b) * 0.5).into(), from_z(&along));
-        let half = 0.5 * (b - a).norm();
-        let radius = size.first().copied().unwrap_or(0.0);
-        size = if ["cylinder", "capsule"].contains(&kind) { vec![radius, half] } else { vec![radius, radius, half] };
-    }
-    let wanted = match kind {
-        "sphere" => 1,
-        "cylinder" | "capsule" => 2,
-        _ => 3,
-    };
-    if size.len() < wanted || size.iter().take(wanted).any(|s| *s <= 0.0) {
-        return Err(r.element.error(format!("a {kind} needs {wanted} positive numbers as size")));
-    }
-    let whole = |size: &[f64]| Vector::new(size[0], size[1], size[2]);
-    Ok(Some(match kind {
-        "box" => Primitive::Cuboid(whole(&size)),
-        "ellipsoid" => Primitive::Ellipsoid(whole(&size)),
-        "sphere" => Primitive::Sphere(size[0]),
-        "cylinder" => Primitive::Cylinder(size[0], size[1]),
-        _ => Primitive::Capsule(size[0], size[1]),
-    }))
 }
 
 #[cfg(test)]
@@ -489,7 +512,7 @@ mod tests {
         assert_eq!(link.shapes.iter().filter(|s| s.visual).count(), 1);
         assert_eq!(link.mass_source, MassSource::Shapes);
         assert!((link.mass.unwrap() - (700.0 * 0.048 + 0.2)).abs() < 1e-9);
-        assert_eq!(m.notes, ["not read: 1 x <equality>"]);
+        assert!(m.notes.is_empty() && m.faults.is_empty(), "{:?} {:?}", m.notes, m.faults);
     }
 
     #[test]
@@ -532,10 +555,8 @@ mod tests {
         for (body, word) in [
             (r#"<geom class="nope" size="1"/>"#, "no default class \"nope\""),
             (r#"<geom type="box" size="1 1"/>"#, "line 1, <geom>: a box needs 3 positive numbers"),
-            (r#"<geom type="mesh" mesh="m"/>"#, "no mesh \"m\""),
             (r#"<body name="a"><joint range="0 inf"/></body>"#, "<joint>: range: inf is not finite"),
             (r#"<body name="a"><joint type="screw"/></body>"#, "\"screw\" is no joint type"),
-            (r#"<include file="nowhere.xml"/>"#, "nowhere.xml, which is not there"),
         ] {
             let error = model(&format!("<mujoco><worldbody>{body}</worldbody></mujoco>")).unwrap_err();
             assert!(error.contains("m.xml") && error.contains(word), "{error}");

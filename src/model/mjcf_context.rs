@@ -1,61 +1,16 @@
-//! What holds for a whole MJCF: the files that it includes, its compiler's settings, default classes, meshes.
+//! What holds for a whole MJCF: its compiler's settings, default classes, meshes.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::collections::BTreeMap;
+use std::path::Path;
 
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
 
+use super::mjcf_assets::{Folders, Mesh, Source};
 use super::xml::{self, Element};
-use crate::error::{Error, Result};
-use crate::math::{Pose, Vector, rotation, unit};
+use crate::error::Result;
+use crate::math::{Point, Pose, Vector, rotation, unit};
 
-const MAX_INCLUDES: usize = 8;
 const MAX_CLASSES: usize = 10_000;
-
-/// Files that other files include.
-pub(super) struct Includes {
-    pub(super) dir: PathBuf,
-    /// Each file once, as MuJoCo has it: loops end here.
-    pub(super) read: BTreeSet<PathBuf>,
-}
-
-impl Includes {
-    /// Puts the contents of included files in the place of their `<include>`.
-    pub(super) fn expand(&mut self, element: &mut Element, depth: usize, notes: &mut Vec<String>) -> Result<()> {
-        if !element.children.iter().any(|c| c.name == "include") {
-            return element.children.iter_mut().try_for_each(|c| self.expand(c, depth, notes));
-        }
-        for mut child in std::mem::take(&mut element.children) {
-            if child.name != "include" {
-                self.expand(&mut child, depth, notes)?;
-                element.children.push(child);
-                continue;
-            }
-            let file = child.get("file").ok_or_else(|| child.error("has no file"))?;
-            if depth >= MAX_INCLUDES {
-                return Err(child.error(format!("files include each other deeper than {MAX_INCLUDES}")));
-            }
-            let beside = child.file.parent().unwrap_or(Path::new("")).join(file);
-            let found = [self.dir.join(file), beside].into_iter().find(|p| p.is_file());
-            let Some(found) = found else {
-                return Err(child.error(format!("includes {}, which is not there", xml::brief(file))));
-            };
-            let real = found.canonicalize().map_err(|e| Error::io(&found, &e))?;
-            let home: &Path = if self.dir.as_os_str().is_empty() { Path::new(".") } else { &self.dir };
-            if !home.canonicalize().is_ok_and(|home| real.starts_with(home)) {
-                notes.push(format!("{} lies outside the model's folder and is not read", xml::brief(file)));
-                continue;
-            }
-            if !self.read.insert(real) {
-                return Err(child.error(format!("includes {} a second time", xml::brief(file))));
-            }
-            let mut root = xml::parse(&found, &xml::read_text(&found)?)?;
-            self.expand(&mut root, depth + 1, notes)?;
-            element.children.append(&mut root.children);
-        }
-        Ok(())
-    }
-}
 
 /// Attributes that a class gives to elements: tag, then attribute, then value.
 pub(super) type Class = BTreeMap<String, BTreeMap<String, String>>;
@@ -65,22 +20,31 @@ pub(super) struct Context {
     pub(super) radian: bool,
     pub(super) autolimits: bool,
     pub(super) euler: [char; 3],
-    pub(super) folders: Vec<PathBuf>,
+    pub(super) folders: Folders,
     /// `Some` where `inertiafromgeom` is not "auto".
     pub(super) from_shapes: Option<bool>,
+    /// Groups of geoms that weigh something, from and to.
+    pub(super) weighing: [f64; 2],
+    /// Whether light bodies are made heavier than nothing.
+    pub(super) bounded: bool,
+    /// What all bodies are scaled to weigh together, kg.
+    pub(super) total: Option<f64>,
     pub(super) classes: BTreeMap<String, Class>,
-    /// Name, then file and scale.
-    pub(super) meshes: BTreeMap<String, (String, Vector)>,
+    /// By name.
+    pub(super) meshes: BTreeMap<String, Mesh>,
 }
 
 impl Context {
-    pub(super) fn read(root: &Element) -> Result<Self> {
+    pub(super) fn read(model: &Path, root: &Element) -> Result<Self> {
         let mut context = Self {
             radian: false,
             autolimits: true,
             euler: ['x', 'y', 'z'],
-            folders: Vec::new(),
+            folders: Folders::default(),
             from_shapes: None,
+            weighing: [0.0, 5.0],
+            bounded: false,
+            total: None,
             classes: BTreeMap::from([(MAIN.to_owned(), Class::new())]),
             meshes: BTreeMap::new(),
         };
@@ -98,9 +62,12 @@ impl Context {
                     .filter(|s| s.iter().all(|c| "xyzXYZ".contains(*c)))
                     .ok_or_else(|| compiler.error("eulerseq must be three of x y z X Y Z"))?;
             }
-            // A folder of meshes goes before one of all assets.
-            let own = ["meshdir", "assetdir"].into_iter().filter_map(|a| compiler.get(a)).map(PathBuf::from);
-            context.folders = own.chain(std::mem::take(&mut context.folders)).collect();
+            context.folders.take(compiler);
+            context.weighing = compiler.numbers::<2>("inertiagrouprange")?.unwrap_or(context.weighing);
+            context.total = compiler.number("settotalmass")?.filter(|m| *m > 0.0).or(context.total);
+            for bound in ["boundmass", "boundinertia"] {
+                context.bounded |= compiler.number(bound)?.is_some_and(|b| b > 0.0);
+            }
             match compiler.get("inertiafromgeom") {
                 Some("true") => context.from_shapes = Some(true),
                 Some("false") => context.from_shapes = Some(false),
@@ -124,14 +91,31 @@ impl Context {
             first = false;
         }
         for asset in root.all("asset").flat_map(|a| a.all("mesh")) {
-            let r = context.resolved(asset, None)?;
-            let file = r.get("file").unwrap_or_default().to_owned();
-            let scale = r.numbers("scale", 3..=3)?.map_or(Vector::repeat(1.0), |s| Vector::from_row_slice(&s));
-            let stem = Path::new(&file).file_stem().map(|s| s.to_string_lossy().into_owned());
-            let Some(name) = asset.get("name").map(str::to_owned).or(stem) else { continue };
-            context.meshes.insert(name, (file, scale));
+            context.mesh(model, asset)?;
         }
         Ok(context)
+    }
+
+    fn mesh(&mut self, model: &Path, asset: &Element) -> Result<()> {
+        let r = self.resolved(asset, None)?;
+        let file = asset.get("file").filter(|f| !f.is_empty());
+        let vector = |attribute: &str, default: Vector| -> Result<Vector> {
+            Ok(r.numbers(attribute, 3..=3)?.map_or(default, |v| Vector::from_row_slice(&v)))
+        };
+        let (scale, origin) = (vector("scale", Vector::repeat(1.0))?, vector("refpos", Vector::zeros())?);
+        let turn = asset.numbers::<4>("refquat")?.and_then(|[w, x, y, z]| turn_of(w, x, y, z));
+        let turn = turn.unwrap_or_else(UnitQuaternion::identity);
+        let source = match (file, corners(asset)?) {
+            (Some(file), _) => Source::File(self.folders.mesh(model, file)),
+            (None, Some(corners)) => Source::Written(corners),
+            (None, None) => Source::Made,
+        };
+        let stem = file.and_then(|f| f.rsplit(['/', '\\']).next()).map(Path::new).and_then(Path::file_stem);
+        let Some(name) = asset.get("name").map(str::to_owned).or(stem.map(|s| s.to_string_lossy().into_owned())) else {
+            return Ok(());
+        };
+        self.meshes.insert(name, Mesh { source, scale, origin, turn });
+        Ok(())
     }
 
     /// Adds a class on top of its parent; its own settings come before the classes in it, wherever they stand.
@@ -140,8 +124,7 @@ impl Context {
             return Err(element.error(format!("more than {MAX_CLASSES} default classes")));
         }
         let mut class = self.classes.get(parent).cloned().unwrap_or_default();
-        for setting in element.children.iter().filter(|c| ["joint", "geom", "site", "mesh"].contains(&c.name.as_str()))
-        {
+        for setting in element.children.iter().filter(|c| c.name != "default") {
             class.entry(setting.name.clone()).or_default().extend(setting.attributes.iter().cloned());
         }
         self.classes.insert(name.to_owned(), class);
@@ -185,7 +168,7 @@ impl Context {
         let vector = |from: usize| Vector::new(v[from], v[from + 1], v[from + 2]);
         let none = || r.element.error(format!("{way} gives no direction: its vectors must not be 0 or parallel"));
         match way {
-            "quat" => UnitQuaternion::try_new(Quaternion::new(v[0], v[1], v[2], v[3]), 1e-9).ok_or_else(none),
+            "quat" => turn_of(v[0], v[1], v[2], v[3]).ok_or_else(none),
             "axisangle" => Ok(rotation(&unit(&vector(0)).ok_or_else(none)?, self.angle(v[3]))),
             "xyaxes" => {
                 let x = unit(&vector(0)).ok_or_else(none)?;
@@ -194,22 +177,41 @@ impl Context {
                 Ok(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes)))
             }
             "zaxis" => Ok(from_z(&unit(&vector(0)).ok_or_else(none)?)),
-            _ => {
-                let mut turn = UnitQuaternion::identity();
-                for (axis, value) in self.euler.iter().zip(&v) {
-                    let about = match axis.to_ascii_lowercase() {
-                        'x' => Vector::x(),
-                        'y' => Vector::y(),
-                        _ => Vector::z(),
-                    };
-                    let step = rotation(&about, self.angle(*value));
-                    // Small letters turn about axes that have turned along, capitals about the parent's.
-                    turn = if axis.is_ascii_lowercase() { turn * step } else { step * turn };
-                }
-                Ok(turn)
-            }
+            _ => Ok(self.turn(&v)),
         }
     }
+
+    /// The turn of Euler angles, which are as the file writes them.
+    pub(super) fn turn(&self, angles: &[f64]) -> UnitQuaternion<f64> {
+        let mut turn = UnitQuaternion::identity();
+        for (axis, value) in self.euler.iter().zip(angles) {
+            let about = match axis.to_ascii_lowercase() {
+                'x' => Vector::x(),
+                'y' => Vector::y(),
+                _ => Vector::z(),
+            };
+            let step = rotation(&about, self.angle(*value));
+            // Small letters turn about axes that have turned along, capitals about the parent's.
+            turn = if axis.is_ascii_lowercase() { turn * step } else { step * turn };
+        }
+        turn
+    }
+}
+
+/// None where the four numbers are 0.
+fn turn_of(w: f64, x: f64, y: f64, z: f64) -> Option<UnitQuaternion<f64>> {
+    UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-9)
+}
+
+/// Lowest and highest corner of the vertices that are written with a mesh.
+fn corners(asset: &Element) -> Result<Option<[Point; 2]>> {
+    let Some(text) = asset.get("vertex").filter(|t| !t.trim().is_empty()) else { return Ok(None) };
+    let values = asset.parse("vertex", text, 3..=usize::MAX)?;
+    let mut ends = [Vector::repeat(f64::INFINITY), Vector::repeat(f64::NEG_INFINITY)];
+    for p in values.chunks_exact(3).map(Vector::from_row_slice) {
+        ends = [ends[0].inf(&p), ends[1].sup(&p)];
+    }
+    Ok(Some(ends.map(Point::from)))
 }
 
 pub(super) const MAIN: &str = "main";

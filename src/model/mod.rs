@@ -5,15 +5,23 @@
 //! reader passes over is listed in [`Model::notes`].
 
 pub mod check;
+mod contacts;
 pub mod furniture;
 pub mod glb;
 mod masses;
 mod mesh;
 pub mod mjcf;
+mod mjcf_assets;
 mod mjcf_context;
+mod mjcf_equality;
+mod mjcf_geoms;
+mod mjcf_refusals;
+mod mjcf_schema;
+mod mjcf_tree;
 mod places;
 mod shapes;
 mod sweep;
+mod traps;
 pub mod urdf;
 mod xml;
 
@@ -39,7 +47,7 @@ pub enum Format {
     },
     /// MJCF.
     Mjcf {
-        /// Whether `<compiler angle="radian">` is written; the format's default are degrees.
+        /// Whether `<compiler angle="radian">` is written, or no angle is; the format's default are degrees.
         radian: bool,
     },
 }
@@ -61,6 +69,10 @@ pub struct Model {
     pub excludes: Vec<[String; 2]>,
     /// What was not read, or read as something simpler.
     pub notes: Vec<String>,
+    /// What may hide joints or shapes and was not read: verdicts about the whole are not to be had.
+    pub unread: Vec<String>,
+    /// What the file's reader found wrong: the number of a point of [`check::POINTS`], and words.
+    pub faults: Vec<(u8, String)>,
 }
 
 /// Where a link's mass comes from.
@@ -197,6 +209,8 @@ pub struct ModelJoint {
     pub armature: Option<f64>,
     /// What `limited` says where it is written (MJCF).
     pub limited: Option<bool>,
+    /// The position that simulators begin at and the file shows, rad or m: MJCF's `ref`, else 0.
+    pub start: f64,
 }
 
 /// How far a joint without limits is taken to open: half a turn, rad, or a long drawer, m.
@@ -220,14 +234,14 @@ impl ModelJoint {
         (lower < upper).then_some([lower, upper])
     }
 
-    /// Closed and open position, rad or m: the limit nearest to 0 and the other one; 0 and half a turn or a metre where
-    /// there are no limits.
+    /// Closed and open position, rad or m: the limit nearest to 0 and the other one; where there are no limits, where
+    /// the file shows the joint, and half a turn or a metre from there.
     #[must_use]
     pub fn closed_and_open(&self) -> [f64; 2] {
         match self.limits() {
             Some([lower, upper]) if lower.abs() <= upper.abs() => [lower, upper],
             Some([lower, upper]) => [upper, lower],
-            None => [0.0, UNLIMITED[usize::from(self.kind == Kind::Prismatic)]],
+            None => [self.start, self.start + UNLIMITED[usize::from(self.kind == Kind::Prismatic)]],
         }
     }
 
@@ -481,6 +495,7 @@ mod tests {
             friction: None,
             armature: None,
             limited: None,
+            start: 0.0,
         }
     }
 
@@ -494,6 +509,8 @@ mod tests {
             joints,
             excludes: Vec::new(),
             notes: Vec::new(),
+            unread: Vec::new(),
+            faults: Vec::new(),
         }
     }
 

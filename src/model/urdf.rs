@@ -48,6 +48,8 @@ pub(super) fn from_element(path: &Path, text: &str, root: &Element) -> Result<Mo
         joints: Vec::new(),
         excludes: Vec::new(),
         notes: Vec::new(),
+        unread: Vec::new(),
+        faults: Vec::new(),
     };
     for child in &root.children {
         match child.name.as_str() {
@@ -217,6 +219,7 @@ fn joint(element: &Element, notes: &mut Vec<String>) -> Result<ModelJoint> {
         friction: of("dynamics", "friction")?,
         armature: None,
         limited: None,
+        start: 0.0,
         name,
     })
 }

@@ -11,6 +11,7 @@ mod foreign;
 mod formats;
 mod honesty;
 mod known_truth;
+mod mjcf;
 mod physics;
 mod real_recordings;
 mod robust;

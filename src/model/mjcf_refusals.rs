@@ -1,0 +1,355 @@
+//! What MuJoCo refuses though each element by itself is allowed: names that name nothing, names twice, bodies that cannot
+//! move, keyframes of another model.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::mjcf_context::{Context, MAIN, Resolved};
+use super::mjcf_schema::{Row, Value, place};
+use super::mjcf_tree::Copies;
+use super::xml::{Element, brief};
+use super::{Kind, Link, MassSource, Model, mjcf};
+
+/// Everything of this kind; `root` is the whole tree, with copies made.
+pub(super) fn refusals(c: &Context, root: &Element, copies: &Copies, model: &Model) -> Vec<String> {
+    let mut out = Refusals { c, copies, model, names: BTreeMap::new(), faults: Vec::new(), mocaps: 0 };
+    if let Some(row) = Row::root() {
+        out.names.entry("body").or_default().insert(mjcf::WORLD.to_owned());
+        out.names.entry("default").or_default().insert(MAIN.to_owned());
+        out.collect(root, row);
+        let at = At { class: None, moving: false, below_world: true, default: false };
+        out.element(root, row, at);
+    }
+    for default in root.all("default") {
+        if let Some(class) = default.get("class").filter(|c| !c.is_empty() && *c != MAIN) {
+            out.fault(default, format!("the outermost class is \"{MAIN}\", not \"{}\"", brief(class)));
+        }
+    }
+    out.weightless();
+    // What was not read may have joints that a keyframe counts.
+    if model.unread.is_empty() {
+        root.all("keyframe").flat_map(|k| k.all("key")).for_each(|key| out.keyframe(key));
+    }
+    out.faults
+}
+
+/// Where an element stands.
+#[derive(Clone, Copy)]
+struct At<'a> {
+    /// The class that holds for what names none.
+    class: Option<&'a str>,
+    /// In a body that joints move.
+    moving: bool,
+    /// Right in the world, or in frames of it.
+    below_world: bool,
+    /// In a default class.
+    default: bool,
+}
+
+struct Refusals<'a> {
+    c: &'a Context,
+    copies: &'a Copies,
+    model: &'a Model,
+    /// Names by kind.
+    names: BTreeMap<&'static str, BTreeSet<String>>,
+    faults: Vec<String>,
+    mocaps: usize,
+}
+
+/// Kinds that the file itself must have, whatever is attached to it.
+const ALWAYS_READ: [&str; 4] = ["default", "material", "texture", "hfield"];
+
+impl Refusals<'_> {
+    fn fault(&mut self, element: &Element, message: impl std::fmt::Display) {
+        let at = place(&self.model.source, element);
+        self.faults.push(format!("{at}: {message}; MuJoCo refuses it"));
+    }
+
+    /// All names, and a fault for each that is there twice.
+    fn collect(&mut self, element: &Element, row: &'static Row) {
+        for (attribute, known) in &row.attributes {
+            let Value::Own(kind) = known.value else { continue };
+            let Some(name) = own_name(element, attribute, kind) else { continue };
+            if kind == "default" && name == MAIN {
+                continue;
+            }
+            if !self.names.entry(kind).or_default().insert(name.clone()) {
+                self.fault(element, format!("\"{}\" is the name of a second {kind}", brief(&name)));
+            }
+        }
+        for child in &element.children {
+            if let Some(below) = row.of_child(&child.name) {
+                self.collect(child, below);
+            }
+        }
+    }
+
+    fn element(&mut self, element: &Element, row: &'static Row, at: At) {
+        // An unknown class is told as any other name that names nothing.
+        let c = self.c;
+        let resolved = c.resolved(element, at.class).unwrap_or(Resolved { element, class: None });
+        for (attribute, known) in &row.attributes {
+            let Value::Other(kind) = known.value else { continue };
+            let written =
+                if at.default { element.get(attribute).filter(|_| kind == "default") } else { resolved.get(attribute) };
+            if let Some(name) = written {
+                self.look_up(element, kind, name);
+            }
+        }
+        for (kind, name) in [("objtype", "objname"), ("reftype", "refname")] {
+            if let (Some(kind), Some(name)) = (element.get(kind), element.get(name)) {
+                self.look_up(element, if kind == "xbody" { "body" } else { kind }, name);
+            }
+        }
+        let mut inside = At { class: element.get("childclass").or(at.class), ..at };
+        match element.name.as_str() {
+            "default" => inside.default = true,
+            "body" if !at.default => {
+                self.body(element, at);
+                let is_mocap = element.get("mocap") == Some("true");
+                inside.moving = !is_mocap && (at.moving || !joints(element).is_empty());
+                inside.below_world = false;
+            }
+            // Other elements have the same tags: parts of tendons, of equalities.
+            "geom" if !at.default && row.attributes.contains_key("fromto") => self.geom(element, &resolved, at),
+            "joint" if !at.default && row.attributes.contains_key("springref") => self.joint(element, &resolved),
+            "actuator" => element.children.iter().for_each(|a| self.actuator(a)),
+            _ => {}
+        }
+        for child in &element.children {
+            if let Some(below) = row.of_child(&child.name) {
+                self.element(child, below, inside);
+            }
+        }
+    }
+
+    fn look_up(&mut self, element: &Element, kind: &str, name: &str) {
+        // What was not read may have the name.
+        let judged = self.model.unread.is_empty() || ALWAYS_READ.contains(&kind);
+        let known = self.names.get(kind).is_some_and(|names| names.contains(name)) || self.copies.has(name);
+        if judged && !known && !name.is_empty() {
+            self.fault(element, format!("there is no {} \"{}\"", brief(kind), brief(name)));
+        }
+    }
+
+    fn body(&mut self, element: &Element, at: At) {
+        let joints = joints(element);
+        if element.get("mocap") == Some("true") {
+            self.mocaps += 1;
+            if !joints.is_empty() || !at.below_world {
+                self.fault(element, "what is moved from outside (mocap) stands right in the world and has no joints");
+            }
+        }
+        let is_free = |j: &&Element| j.name == "freejoint" || j.get("type") == Some("free");
+        if joints.len() > 1 && joints.iter().any(is_free) {
+            self.fault(element, "a free joint must be the only one of its body");
+        }
+    }
+
+    fn geom(&mut self, element: &Element, r: &Resolved, at: At) {
+        let kind = r.get("type").unwrap_or("sphere");
+        match kind {
+            "plane" if at.moving => {
+                self.fault(element, "a plane may only stand still, and this body moves: take a box");
+            }
+            "mesh" | "sdf" if r.get("mesh").is_none_or(str::is_empty) => {
+                self.fault(element, format!("a geom of type {kind} needs a mesh"));
+            }
+            "hfield" if r.get("hfield").is_none_or(str::is_empty) => {
+                self.fault(element, "a height field needs its hfield")
+            }
+            _ => {}
+        }
+        if r.get("fromto").is_some() {
+            if !["capsule", "cylinder", "box", "ellipsoid"].contains(&kind) {
+                self.fault(element, format!("fromto is not for a {}", brief(kind)));
+            } else if r.numbers("pos", 3..=3).ok().flatten().is_some_and(|p| p.iter().any(|x| *x != 0.0)) {
+                self.fault(element, "both pos and fromto say where it is: take one");
+            }
+        }
+    }
+
+    fn joint(&mut self, element: &Element, r: &Resolved) {
+        let range = r.numbers("range", 2..=2).ok().flatten().unwrap_or_default();
+        let (low, high) = (range.first().copied().unwrap_or(0.0), range.get(1).copied().unwrap_or(0.0));
+        let kind = r.get("type").unwrap_or("hinge");
+        match r.get("limited").unwrap_or("auto") {
+            _ if kind == "free" => {}
+            "auto" if !self.c.autolimits && (low != 0.0 || high != 0.0) => {
+                self.fault(element, "has a range but not limited, and autolimits is off: write limited=\"true\"");
+            }
+            "true" if kind != "ball" && low >= high => {
+                self.fault(element, format!("is limited to {low} to {high}, which is no range: write range=\"0 ...\""));
+            }
+            _ => {}
+        }
+    }
+
+    fn actuator(&mut self, element: &Element) {
+        const TARGETS: [&str; 7] = ["joint", "jointinparent", "tendon", "site", "slidersite", "cranksite", "body"];
+        if TARGETS.into_iter().all(|t| element.get(t).is_none_or(str::is_empty)) {
+            self.fault(element, "moves nothing: name a joint, tendon, site or body");
+        }
+    }
+
+    /// Bodies that move, and of which neither they nor what is fixed to them weigh anything.
+    fn weightless(&mut self) {
+        let Ok(tree) = self.model.tree() else { return };
+        if self.c.bounded || !self.model.unread.is_empty() {
+            return;
+        }
+        let model = self.model;
+        let links = &model.links;
+        let mut weighs = vec![false; links.len()];
+        for (link, body) in links.iter().zip(&tree.body) {
+            weighs[*body] |= has_weight(link);
+        }
+        for joint in &model.joints {
+            let Some(child) = links.iter().position(|l| l.name == joint.child) else { continue };
+            if joint.kind != Kind::Fixed && !links[child].between && !weighs[tree.body[child]] {
+                self.faults.push(format!(
+                    "{}: moves, and neither it nor what is fixed to it has mass and inertia: MuJoCo refuses it; write \
+                     <inertial>, or a density for its shapes",
+                    joint.child
+                ));
+            }
+        }
+    }
+
+    /// How many numbers a keyframe must have.
+    fn keyframe(&mut self, key: &Element) {
+        let count = |free: usize, ball: usize| -> usize {
+            let of = |kind: Kind| match kind {
+                Kind::Fixed => 0,
+                Kind::Free => free,
+                Kind::Other => ball,
+                Kind::Revolute | Kind::Continuous | Kind::Prismatic => 1,
+            };
+            self.model.joints.iter().map(|j| of(j.kind)).sum()
+        };
+        let wanted =
+            [("qpos", count(7, 4)), ("qvel", count(6, 3)), ("mpos", 3 * self.mocaps), ("mquat", 4 * self.mocaps)];
+        for (attribute, wanted) in wanted {
+            let have = key.get(attribute).map_or(0, |text| text.split_ascii_whitespace().count());
+            if have != 0 && have != wanted {
+                self.fault(key, format!("{attribute} has {have} numbers, the model {wanted}"));
+            }
+        }
+    }
+}
+
+/// Whether MuJoCo finds mass and inertia in a link; what only a mesh would tell is taken to have both.
+fn has_weight(link: &Link) -> bool {
+    // Below this MuJoCo takes a number for 0, kg and kg m^2.
+    const NOTHING: f64 = 1e-15;
+    match (link.mass_source, link.mass) {
+        (MassSource::Nothing, _) | (MassSource::Stated, None) => false,
+        (_, None) => true,
+        (_, Some(mass)) => mass > NOTHING && (0..3).all(|k| link.inertia[(k, k)] > NOTHING),
+    }
+}
+
+/// The joints of a body, through its frames.
+fn joints(element: &Element) -> Vec<&Element> {
+    let mut out = Vec::new();
+    for child in &element.children {
+        match child.name.as_str() {
+            "joint" | "freejoint" => out.push(child),
+            "frame" => out.extend(joints(child)),
+            _ => {}
+        }
+    }
+    out
+}
+
+/// An element's name, which for files is that of the file where none is written.
+fn own_name(element: &Element, attribute: &str, kind: &str) -> Option<String> {
+    let name = element.get(attribute).filter(|n| !n.is_empty()).map(str::to_owned);
+    if name.is_some() || !["mesh", "texture", "hfield", "skin", "model"].contains(&kind) {
+        return name;
+    }
+    let file = element.get("file")?.rsplit(['/', '\\']).next()?;
+    Some(file.rsplit_once('.').map_or(file, |(stem, _)| stem).to_owned()).filter(|n| !n.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::super::xml;
+    use super::*;
+
+    /// The faults of point 1.
+    fn faults(text: &str) -> Vec<String> {
+        let root = xml::parse(Path::new("m.xml"), text).unwrap();
+        let model = mjcf::from_element(Path::new("m.xml"), root).unwrap();
+        model.faults.into_iter().filter(|(point, _)| *point == 1).map(|(_, f)| f).collect()
+    }
+
+    const DOOR: &str = r#"<body name="door"><joint name="hinge"/><geom name="panel" size="0.1"/></body>"#;
+
+    #[test]
+    fn names_that_name_nothing_are_told() {
+        for (body, rest, word) in [
+            ("<geom material=\"oak\" size=\"1\"/>", "", "there is no material \"oak\""),
+            ("<geom type=\"mesh\" mesh=\"m\"/>", "", "there is no mesh \"m\""),
+            ("", "<actuator><motor joint=\"no\"/></actuator>", "<motor>: there is no joint \"no\""),
+            ("", "<actuator><motor/></actuator>", "moves nothing"),
+            ("", "<contact><exclude body1=\"door\" body2=\"no\"/></contact>", "there is no body \"no\""),
+            ("", "<sensor><framepos objtype=\"site\" objname=\"no\"/></sensor>", "there is no site \"no\""),
+            ("", "<equality><weld body1=\"no\"/></equality>", "there is no body \"no\""),
+            ("", "<keyframe><key qpos=\"0 0 0\"/></keyframe>", "qpos has 3 numbers, the model 1"),
+            ("<geom name=\"panel\" size=\"1\"/>", "", "\"panel\" is the name of a second geom"),
+            ("", "<default class=\"house\"/>", "the outermost class is \"main\""),
+            ("<geom size=\"1\"/>", "<default><geom material=\"no\"/></default>", "there is no material \"no\""),
+        ] {
+            let found = faults(&format!("<mujoco><worldbody>{DOOR}{body}</worldbody>{rest}</mujoco>"));
+            assert!(!found.is_empty() && found.iter().all(|f| f.contains(word)), "{body}{rest}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn what_names_something_passes() {
+        for (body, rest) in [
+            ("", "<contact><exclude body1=\"door\" body2=\"world\"/></contact>"),
+            ("", "<sensor><framepos objtype=\"xbody\" objname=\"door\"/></sensor>"),
+            ("", "<actuator><position joint=\"hinge\" kp=\"1\"/></actuator>"),
+            ("", "<default><default class=\"unused\"><geom material=\"no\"/></default></default>"),
+            ("<geom material=\"\" size=\"1\"/>", "<keyframe><key qpos=\"0\"/></keyframe>"),
+            (
+                "<replicate count=\"2\"><body name=\"b\"><joint name=\"j\"/><geom size=\"1\"/></body></replicate>",
+                "<actuator><motor joint=\"j\"/></actuator><keyframe><key qpos=\"0 0 0\"/></keyframe>",
+            ),
+            ("<attach model=\"m\" prefix=\"p_\"/>", "<actuator><motor joint=\"p_j\"/></actuator>"),
+        ] {
+            let asset = "<asset><model name=\"m\" file=\"other.xml\"/></asset>";
+            let found = faults(&format!("<mujoco>{asset}<worldbody>{DOOR}{body}</worldbody>{rest}</mujoco>"));
+            assert!(found.is_empty(), "{body}{rest}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn bodies_that_cannot_be_are_told() {
+        for (joint, geom, word) in [
+            ("<joint/>", "<geom type=\"plane\" size=\"1 1 1\"/><geom size=\"1\"/>", "may only stand still"),
+            ("<joint/>", "<geom type=\"sdf\"/><geom size=\"1\"/>", "type sdf needs a mesh"),
+            ("<joint/>", "", "b: moves, and neither it"),
+            ("<joint/>", "<geom size=\"1\" mass=\"0\"/>", "b: moves, and neither it"),
+            ("<joint/>", "<inertial pos=\"0 0 0\" mass=\"4\"/>", "b: moves, and neither it"),
+            ("<joint limited=\"true\"/>", "<geom size=\"1\"/>", "which is no range"),
+            ("<joint/><freejoint/>", "<geom size=\"1\"/>", "must be the only one"),
+            ("", "<geom type=\"box\" size=\"1\" fromto=\"0 0 0 1 0 0\" pos=\"1 0 0\"/>", "both pos and fromto"),
+            ("", "<geom size=\"1\" fromto=\"0 0 0 1 0 0\"/>", "fromto is not for a sphere"),
+            ("<joint/>", "<body><geom size=\"1\"/></body>", ""),
+            ("", "<geom type=\"plane\" size=\"1 1 1\"/>", ""),
+            ("<joint range=\"3 1\"/>", "<geom size=\"1\"/>", ""),
+        ] {
+            let found =
+                faults(&format!("<mujoco><worldbody><body name=\"b\">{joint}{geom}</body></worldbody></mujoco>"));
+            if word.is_empty() {
+                assert!(found.is_empty(), "{joint}{geom}: {found:?}");
+            } else {
+                assert!(found.len() == 1 && found[0].contains(word), "{joint}{geom}: {found:?}");
+            }
+        }
+    }
+}

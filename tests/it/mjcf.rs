@@ -1,0 +1,284 @@
+//! MJCF files as people have them, held to what MuJoCo makes of them.
+
+use std::path::{Path, PathBuf};
+
+use paws_twin::error::Result;
+use paws_twin::math::{Point, Vector};
+use paws_twin::model::check::{self, Verdict};
+use paws_twin::model::furniture::to_twin;
+use paws_twin::model::{self, Kind, Model};
+
+use crate::common::{paws, stderr};
+
+fn file(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/mjcf").join(name)
+}
+
+fn read(name: &str) -> Result<Model> {
+    model::read(&file(name))
+}
+
+fn points(name: &str) -> Vec<check::Point> {
+    check::model(&read(name).unwrap(), None)
+}
+
+fn point(name: &str, id: u8) -> check::Point {
+    points(name).into_iter().find(|p| p.id == id).unwrap()
+}
+
+#[test]
+fn what_mujoco_refuses_does_not_load_without_a_word() {
+    for (name, word) in [
+        ("actuator_bad", "there is no joint \"nojoint\""),
+        ("autolimits_false_range", "autolimits is off"),
+        ("b_plugin_sdf", "needs a mesh"),
+        ("dup_body_name", "\"frame\" is the name of a second body"),
+        ("dup_geom_name", "\"panel\" is the name of a second geom"),
+        ("exclude_bad", "there is no body \"nobody\""),
+        ("inertial_nodiag", "leaf: moves, and neither it"),
+        ("inertial_nopos", "needs the attribute \"pos\""),
+        ("keyframe_bad", "qpos has 3 numbers, the model 1"),
+        ("limited_true_norange", "which is no range"),
+        ("material_unknown", "there is no material \"wood\""),
+        ("mesh_missing", "nowhere.obj: there is no such file"),
+        ("plane_body", "a plane may only stand still"),
+        ("texture_missing", "no.png: there is no such file"),
+        ("typo_elem", "line 8, <goem>: MJCF has no such element"),
+        ("unknown_attr", "has no attribute \"apirate\""),
+        ("unknown_elem", "<region>: MJCF has no such element"),
+    ] {
+        let one = point(&format!("12_mjcf/{name}.xml"), 1);
+        assert_eq!(one.verdict, Verdict::Fail, "{name}");
+        assert!(one.faults.iter().any(|f| f.contains(word)), "{name}: {:?}", one.faults);
+    }
+    for (name, word) in [
+        ("12_mjcf/class_unknown.xml", "no default class \"nope\""),
+        ("12_mjcf/coord_global.xml", "global coordinates"),
+        ("12_mjcf/pos_nan.xml", "not finite"),
+        ("12_mjcf/b_inc.xml", "expected <robot>"),
+        ("13_include/twice.xml", "a second time"),
+    ] {
+        let error = read(name).unwrap_err().to_string();
+        assert!(error.contains(word), "{name}: {error}");
+    }
+}
+
+#[test]
+fn what_mujoco_loads_loads() {
+    for name in [
+        "b_actuatorfrc",
+        "b_attach",
+        "b_body_in_default",
+        "b_damping0",
+        "b_euler",
+        "b_exclude_world",
+        "b_fit_geom",
+        "b_flex",
+        "b_gravity",
+        "b_joint_pos",
+        "b_margin_gap",
+        "b_meshdir_include",
+        "b_mirror_mesh",
+        "b_nameless",
+        "b_overlap_static_parent",
+        "b_range_deg_in_rad",
+        "b_range_rad_in_deg",
+        "b_stiff_spring",
+        "b_two_joints",
+        "ball",
+        "bom",
+        "childclass",
+        "class_override",
+        "contype0",
+        "degree_explicit_drawer",
+        "degrees_default",
+        "equality_joint",
+        "equality_weld",
+        "eulerseq_xyz_caps",
+        "exclude_welded",
+        "frame_wrap",
+        "free_door",
+        "fromto_box",
+        "gravcomp",
+        "limited_false_range",
+        "mesh_inline",
+        "mesh_offcentre",
+        "mesh_refpos",
+        "mocap_door",
+        "no_angles_drawer",
+        "ok",
+        "range00_auto",
+        "range_reversed_auto",
+        "ref",
+        "replicate",
+        "settotalmass",
+        "size_nconmax",
+        "springref",
+        "strippath",
+        "two_defaults",
+    ] {
+        let one = point(&format!("12_mjcf/{name}.xml"), 1);
+        assert_eq!(one.verdict, Verdict::Pass, "{name}: {:?}", one.faults);
+    }
+}
+
+#[test]
+fn includes_are_read_where_mujoco_reads_them() {
+    for name in ["inside.xml", "nested_beside.xml", "scene/outside.xml"] {
+        let name = format!("13_include/{name}");
+        let model = read(&name).unwrap();
+        assert_eq!(model.moving().map(|(_, j)| j.name.as_str()).collect::<Vec<_>>(), ["hinge"], "{name}");
+        assert!(model.unread.is_empty() && model.moving().all(|(_, j)| j.limits() == Some([0.0, 1.5])), "{name}");
+        assert!(points(&name).iter().all(|p| p.faults.is_empty()), "{name}: {:?}", points(&name));
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("m.xml");
+    std::fs::write(&path, "<mujoco>\n<include file=\"gone.xml\"/>\n</mujoco>").unwrap();
+    let points = check::model(&model::read(&path).unwrap(), None);
+    let fault = "line 2, <include>: includes gone.xml, which is not there";
+    assert!(points[0].faults.iter().any(|f| f.contains(fault)), "{points:?}");
+    assert_eq!(points[1].verdict, Verdict::NotJudged);
+}
+
+#[test]
+fn each_point_says_what_is_wrong() {
+    for (name, id, word) in [
+        ("12_mjcf/b_overlap_static_parent.xml", 11, "when closed"),
+        ("12_mjcf/contype0.xml", 5, "none of its part's shapes takes part in contacts"),
+        ("12_mjcf/equality_weld.xml", 2, "<weld> holds it fast"),
+        ("12_mjcf/equality_joint.xml", 2, "<joint> holds it fast"),
+        ("12_mjcf/range00_auto.xml", 2, "without limits"),
+        ("12_mjcf/range_reversed_auto.xml", 2, "without limits"),
+        ("12_mjcf/degrees_default.xml", 6, "angles are degrees"),
+        ("18_hairline/g0.0010.xml", 11, "which stops it"),
+        ("18_hairline/g0.0015.xml", 11, "which stops it"),
+        ("18_hairline/t0.05.xml", 11, "which stops it"),
+    ] {
+        let point = point(name, id);
+        assert!(point.verdict == Verdict::Fail && point.faults.iter().any(|f| f.contains(word)), "{name}: {point:?}");
+    }
+    for (name, id) in [
+        ("12_mjcf/exclude_welded.xml", 11),
+        ("12_mjcf/no_angles_drawer.xml", 6),
+        ("12_mjcf/degree_explicit_drawer.xml", 6),
+        ("12_mjcf/ref.xml", 2),
+        ("12_mjcf/replicate.xml", 11),
+        ("18_hairline/g0.0021.xml", 11),
+        ("18_hairline/g0.0022.xml", 11),
+        ("18_hairline/g0.004.xml", 11),
+        ("22_inertia_static/static_base.xml", 3),
+    ] {
+        let point = point(name, id);
+        assert_eq!(point.verdict, Verdict::Pass, "{name}: {point:?}");
+    }
+    let ball = point("12_mjcf/ball.xml", 2);
+    assert!(ball.told.iter().any(|t| t.contains("hinge: moves in several directions")), "{ball:?}");
+    for name in ["b_stiff_spring", "springref"] {
+        let notes = read(&format!("12_mjcf/{name}.xml")).unwrap().notes;
+        assert!(notes.iter().any(|n| n.starts_with("hinge: its spring (stiffness")), "{name}: {notes:?}");
+    }
+}
+
+#[test]
+fn what_was_not_read_is_not_judged() {
+    for name in ["b_attach.xml", "b_flex.xml"] {
+        let out = paws(&["check", name, "--json"], &file("12_mjcf"));
+        assert_eq!(out.status.code(), Some(1), "{name}: {}", stderr(&out));
+        let all: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+        let two = all[0]["points"].as_array().unwrap().iter().find(|p| p["id"] == 2).unwrap();
+        assert_eq!(two["verdict"], "not judged", "{name}");
+        let out = paws(&["check", name], &file("12_mjcf"));
+        assert!(String::from_utf8_lossy(&out.stdout).contains('?'), "{name}");
+    }
+    // Copies are read.
+    let model = read("12_mjcf/replicate.xml").unwrap();
+    assert!(model.unread.is_empty());
+    let links: Vec<&str> = model.moving().map(|(_, j)| j.child.as_str()).collect();
+    assert_eq!(links, ["leaf0", "leaf1"]);
+    let poses = model.poses(&model.tree().unwrap(), &[]);
+    let at = |name: &str| poses[model.links.iter().position(|l| l.name == name).unwrap()].translation.vector;
+    assert!((at("leaf1") - at("leaf0") - Vector::z()).norm() < 1e-12);
+}
+
+#[test]
+fn copies_stand_where_mujoco_puts_them() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("m.xml");
+    let text = r#"<mujoco><worldbody><replicate count="3" offset="1 0 0" euler="0 0 30" sep="_">
+        <body name="b"><geom size="0.1" pos="0 1 0"/></body></replicate></worldbody></mujoco>"#;
+    std::fs::write(&path, text).unwrap();
+    let model = model::read(&path).unwrap();
+    let poses = model.poses(&model.tree().unwrap(), &[]);
+    // From MuJoCo 4.0.
+    let wanted = [[0.0, 1.0, 0.0], [0.5, 0.866_025_403_784, 0.0], [1.0, 1.0, 0.0]];
+    for (i, wanted) in wanted.into_iter().enumerate() {
+        let link = model.links.iter().position(|l| l.name == format!("b_{i}")).unwrap();
+        let at = poses[link] * model.links[link].shapes[0].bounds.center;
+        assert!((at - Point::from(wanted)).norm() < 1e-9, "{i}: {at}");
+    }
+}
+
+#[test]
+fn a_reference_is_where_the_file_shows_the_joint() {
+    let model = read("12_mjcf/ref.xml").unwrap();
+    let tree = model.tree().unwrap();
+    let (index, hinge) = model.moving().next().unwrap();
+    assert_eq!((hinge.start, hinge.closed_and_open()), (0.2, [0.2, 1.7]));
+    let link = model.links.iter().position(|l| l.name == "leaf").unwrap();
+    // Where MuJoCo 4.0 has the handle at these positions.
+    for (position, wanted) in [(0.2, [0.25, -0.03, 0.5]), (1.0, [0.061_668_01, -0.415_447_05, 0.5])] {
+        let mut positions = vec![0.0; model.joints.len()];
+        positions[index] = position;
+        let handle = model.poses(&tree, &positions)[link] * Point::new(0.55, -0.03, 0.0);
+        assert!((handle - Point::from(wanted)).norm() < 1e-7, "{position}: {handle}");
+    }
+    // The pose that is shown is the closed one for whoever replays it.
+    let (twin, _) = to_twin(&model);
+    let part = &twin.furniture[0].part;
+    assert!((part.handle - Point::new(0.25, -0.03, 0.5)).norm() < 1e-9 && (part.joint.upper - 1.5).abs() < 1e-12);
+}
+
+#[test]
+fn meshes_lie_where_mujoco_has_them() {
+    for (name, center) in
+        [("mesh_refpos", [0.0, 0.0, 0.0]), ("strippath", [0.3, 0.0, 0.0]), ("mesh_inline", [0.3, 0.0, 0.0])]
+    {
+        let model = read(&format!("12_mjcf/{name}.xml")).unwrap();
+        let leaf = model.links.iter().find(|l| l.name == "leaf").unwrap();
+        let panel = leaf.shapes.iter().find(|s| s.name.as_deref() == Some("panel")).unwrap();
+        assert!((panel.bounds.center - Point::from(center)).norm() < 1e-6, "{name}: {}", panel.bounds.center);
+        assert!(!leaf.incomplete && leaf.collides_as_mesh, "{name}");
+    }
+    let missing = read("12_mjcf/mesh_missing.xml").unwrap();
+    assert!(missing.links.iter().any(|l| l.incomplete));
+}
+
+#[test]
+fn a_board_whose_contact_is_excluded_holds_no_part() {
+    let (twin, notes) = to_twin(&read("12_mjcf/exclude_welded.xml").unwrap());
+    assert_eq!(twin.furniture.len(), 1);
+    let boards = twin.furniture[0].carcass.iter().chain(&twin.room).map(|s| s.name.as_str()).collect::<Vec<_>>();
+    assert!(!boards.contains(&"c"), "{boards:?}");
+    assert!(notes.iter().any(|n| n.starts_with("1 boards that a part goes through")), "{notes:?}");
+}
+
+#[test]
+fn a_joint_keeps_its_name_beside_a_geom_of_that_name() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("m.xml");
+    let text = r#"<mujoco><compiler angle="radian"/><worldbody>
+        <body name="a"><joint name="upper" range="0 1"/><geom name="lower" size="0.1"/>
+          <body name="b"><joint name="lower" range="0 1"/><geom size="0.1"/></body></body></worldbody></mujoco>"#;
+    std::fs::write(&path, text).unwrap();
+    let (twin, _) = to_twin(&model::read(&path).unwrap());
+    let ids: Vec<&str> = twin.furniture.iter().map(|f| f.part.id.as_str()).collect();
+    assert_eq!(ids, ["upper", "lower"]);
+}
+
+#[test]
+fn all_bodies_together_weigh_what_the_file_says() {
+    let model = read("12_mjcf/settotalmass.xml").unwrap();
+    let total: f64 = model.links.iter().filter_map(|l| l.mass).sum();
+    assert!((total - 20.0).abs() < 1e-9, "{total}");
+    assert!(model.joints.iter().any(|j| j.kind == Kind::Revolute));
+}
