@@ -38,6 +38,17 @@ impl<'a> Contacts<'a> {
         Self { tree, excluded, carrier }
     }
 
+    /// Pairs of links that the file excludes, the smaller index first.
+    pub(super) fn excluded_pairs(&self) -> BTreeSet<[usize; 2]> {
+        self.excluded.iter().map(|&(a, b)| [a, b]).collect()
+    }
+
+    /// Pairs of rigid bodies, the smaller index first, of which one carries the other and is not fixed to the world.
+    pub(super) fn families(&self) -> BTreeSet<[usize; 2]> {
+        let carried = self.tree.body.iter().zip(&self.carrier);
+        carried.filter_map(|(&body, carrier)| carrier.map(|c| [body.min(c), body.max(c)])).collect()
+    }
+
     /// Whether two links never touch: the pair is excluded, or one body carries the other and is not fixed to the world.
     /// What is rigidly connected is one body for this, but not for the excluded pairs.
     pub(super) fn off(&self, a: usize, b: usize) -> bool {

@@ -6,7 +6,7 @@ use nalgebra::Matrix3;
 
 use super::contacts::Contacts;
 use super::sweep::GRAZE_M;
-use super::{Format, Kind, Model, ModelJoint, Shape, Tree, check, penetration};
+use super::{Kind, Model, ModelJoint, Shape, Tree, check, penetration};
 use crate::articulation::{Articulation, JointKind};
 use crate::math::{Point, Pose, Vector, any_orthogonal, centroid, reject, unit};
 use crate::twin::{ContactRule, ContactRules, Furniture, Joint, LeftOut, OrientedBox, Part, Role, Solid, Twin};
@@ -90,35 +90,10 @@ pub fn to_ruled_twin(model: &Model) -> (Twin, ContactRules, Vec<String>) {
         notes.push(format!("no part states its mass; {DENSITY} kg/m^3 is taken"));
     }
     boards(model, &tree, &poses, &built, &mut twin, &mut names, &mut notes);
-    let rules = ContactRules { solids: names.solids, excluded: excluded(model), family: family(model, &tree) };
+    let contacts = Contacts::of(model, &tree);
+    let rules =
+        ContactRules { solids: names.solids, excluded: contacts.excluded_pairs(), family: contacts.families() };
     (twin, rules, notes)
-}
-
-/// Pairs of links that the file excludes.
-fn excluded(model: &Model) -> BTreeSet<[usize; 2]> {
-    let index: BTreeMap<&str, usize> = model.links.iter().enumerate().map(|(i, l)| (l.name.as_str(), i)).collect();
-    let find = |name: &String| index.get(name.as_str()).copied();
-    model.excludes.iter().filter_map(|[a, b]| find(a).zip(find(b))).map(|(a, b)| [a.min(b), a.max(b)]).collect()
-}
-
-/// Pairs of rigid bodies of which one carries the other and is not fixed to the world: MuJoCo lets them overlap.
-fn family(model: &Model, tree: &Tree) -> BTreeSet<[usize; 2]> {
-    let mut pairs = BTreeSet::new();
-    if !matches!(model.format, Format::Mjcf { .. }) {
-        return pairs;
-    }
-    let ground = tree.order.first().copied();
-    for body in tree.body.iter().copied() {
-        let mut above = tree.parent[body];
-        // Links between the joints of one body are no bodies.
-        while let Some(link) = above.filter(|link| model.links[*link].between) {
-            above = tree.parent[link];
-        }
-        if let Some(carrier) = above.map(|link| tree.body[link]).filter(|carrier| Some(*carrier) != ground) {
-            pairs.insert([body.min(carrier), body.max(carrier)]);
-        }
-    }
-    pairs
 }
 
 /// Frames, and links between two joints of one body, weigh nothing.
