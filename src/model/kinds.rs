@@ -12,7 +12,7 @@ pub(super) const WANTED: &str =
 const HEAD: u64 = 4096;
 
 /// How files begin that are no models, and what they are.
-const MAGIC: [(&[u8], &str); 15] = [
+const MAGIC: [(&[u8], &str); 14] = [
     (b"version https://git-lfs", "is a Git LFS pointer, not the file that it stands for; run `git lfs pull`"),
     (b"\x1f\x8b", "is compressed with gzip; unpack it first (gunzip)"),
     (b"BZh", "is compressed with bzip2; unpack it first (bunzip2)"),
@@ -26,7 +26,6 @@ const MAGIC: [(&[u8], &str); 15] = [
     (b"\x89PNG", "is a picture (PNG)"),
     (b"\xff\xd8\xff", "is a picture (JPEG)"),
     (b"%PDF", "is a PDF"),
-    (b"MJB", "is a compiled MuJoCo model (.mjb), which is not read; save it as XML (mj_saveLastXML)"),
     (b"\x7fELF", "is a program"),
 ];
 
