@@ -7,8 +7,8 @@ use nalgebra::{Matrix4, Quaternion, UnitQuaternion};
 use serde_json::Value;
 
 use super::gltf_file::{self, File, Why, index, list, row};
-use super::rigid_bodies::{self, PhysicsJoint};
-use super::{gltf_extensions, xml};
+pub use super::rigid_bodies::{PhysicsJoint, PhysicsLimit};
+use super::{gltf_extensions, rigid_bodies, xml};
 use crate::articulation::JointKind;
 use crate::error::{Error, Result};
 use crate::math::{Point, Vector};
