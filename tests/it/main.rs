@@ -10,6 +10,7 @@ mod floors;
 mod foreign;
 mod formats;
 mod known_truth;
+mod models;
 mod physics;
 mod real_recordings;
 mod same_bytes;
