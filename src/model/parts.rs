@@ -48,7 +48,9 @@ fn sizes(said: &mut Said, model: &Model, tree: &Tree) {
         .collect();
     let bases: BTreeSet<&str> = model.moving().map(|(_, j)| j.parent.as_str()).collect();
     for (i, link) in model.links.iter().enumerate() {
-        let (moves, carries) = (bodies.contains(&tree.body[i]), bases.contains(link.name.as_str()));
+        let moves = bodies.contains(&tree.body[i]);
+        // The world has floors of any size.
+        let carries = bases.contains(link.name.as_str()) && link.name != super::mjcf::WORLD;
         let most = if moves { MAX_PART_M } else { MAX_BASE_M };
         let extent = extent(link);
         if (moves || carries) && extent > most {

@@ -76,13 +76,9 @@ impl<'a> Geometry<'a> {
         let pose = super::urdf::pose(element)?;
         let primitive = match element.child("geometry").and_then(|g| g.children.first()) {
             Some(solid) if solid.name == "mesh" => self.mesh(link, solid, visual)?,
-            Some(solid) => self.primitive(&link.name, solid)?,
+            Some(solid) => self.primitive(&link.name, solid, visual)?,
             None => {
-                let what = element.label();
-                self.faults.push(format!(
-                    "{}: {what} in line {} has no geometry: MuJoCo refuses the file",
-                    link.name, element.line
-                ));
+                self.fault(&link.name, element, "has no geometry: MuJoCo refuses the file");
                 None
             }
         };
@@ -100,12 +96,22 @@ impl<'a> Geometry<'a> {
         Ok(())
     }
 
+    /// Whether MuJoCo looks at a shape: it leaves visual ones out unless it is told to keep them.
+    fn mujoco_reads(&self, visual: bool) -> bool {
+        !visual || self.compiler.keeps_visuals
+    }
+
+    /// What follows from a shape without volume.
+    fn consequence(&self, visual: bool) -> &'static str {
+        if self.mujoco_reads(visual) { "MuJoCo refuses the file" } else { "viewers show nothing of it" }
+    }
+
     /// A fault of one element of a link.
     fn fault(&mut self, link: &str, element: &Element, what: &str) {
         self.faults.push(format!("{link}: {} in line {} {what}", element.label(), element.line));
     }
 
-    fn primitive(&mut self, link: &str, solid: &Element) -> Result<Option<Primitive>> {
+    fn primitive(&mut self, link: &str, solid: &Element, visual: bool) -> Result<Option<Primitive>> {
         let sizes: Option<Vec<f64>> = match solid.name.as_str() {
             "box" => solid.numbers::<3>("size")?.map(Vec::from),
             "cylinder" | "capsule" => match (solid.number("radius")?, solid.number("length")?) {
@@ -128,7 +134,8 @@ impl<'a> Geometry<'a> {
             return Ok(None);
         }
         if sizes.iter().any(|s| *s <= 0.0) {
-            self.fault(link, solid, "has a size that is not positive: MuJoCo refuses the file");
+            let what = format!("has a size that is not positive: {}", self.consequence(visual));
+            self.fault(link, solid, &what);
         }
         let size = |i: usize| sizes.get(i).copied().unwrap_or(0.0).abs();
         Ok(Some(match solid.name.as_str() {
@@ -140,7 +147,7 @@ impl<'a> Geometry<'a> {
     }
 
     /// The scale of a mesh; one number counts for all three, as most readers have it.
-    fn scale(&mut self, link: &str, solid: &Element) -> Result<Vector> {
+    fn scale(&mut self, link: &str, solid: &Element, visual: bool) -> Result<Vector> {
         let Some(text) = solid.get("scale") else { return Ok(Vector::repeat(1.0)) };
         let values = solid.parse("scale", text, 1..=3)?;
         let scale = match values.as_slice() {
@@ -154,7 +161,8 @@ impl<'a> Geometry<'a> {
             _ => return Err(solid.error("scale: expected 3 numbers")),
         };
         if scale.iter().any(|s| *s == 0.0) {
-            self.fault(link, solid, "has a scale of 0, which leaves no volume: MuJoCo refuses the file");
+            let what = format!("has a scale of 0, which leaves no volume: {}", self.consequence(visual));
+            self.fault(link, solid, &what);
         }
         Ok(scale)
     }
@@ -166,7 +174,7 @@ impl<'a> Geometry<'a> {
         };
         link.meshes.push(file.to_owned());
         link.collides_as_mesh |= !visual;
-        let scale = self.scale(&link.name, solid)?;
+        let scale = self.scale(&link.name, solid, visual)?;
         let Some(measured) = self.of_file(&link.name, file, visual) else { return Ok(None) };
         let [low, high] = match measured.bounds {
             Ok(bounds) => bounds,
@@ -186,8 +194,7 @@ impl<'a> Geometry<'a> {
     /// A mesh's file, measured; `None`, and a fault, where there is none.
     fn of_file(&mut self, link: &str, file: &str, visual: bool) -> Option<Measured> {
         let shown = xml::brief(file);
-        // MuJoCo leaves visual shapes out unless it is told to keep them.
-        let mujoco = !visual || self.compiler.keeps_visuals;
+        let mujoco = self.mujoco_reads(visual);
         let slashes = file.replace('\\', "/");
         let last = slashes.rsplit('/').next().unwrap_or(&slashes);
         let written = if self.compiler.strips_paths { last } else { slashes.as_str() };
