@@ -173,7 +173,8 @@ fn limits(model: &Model, tree: Option<&Tree>) -> Said {
         match (joint.lower, joint.upper) {
             (Some(lower), Some(upper)) => {
                 range(&mut said, model, joint, kind, [lower, upper]);
-                if let Some(tree) = tree.filter(|_| kind == JointKind::Prismatic && lower < upper) {
+                let slides = kind == JointKind::Prismatic && (0.0..=MAX_SLIDE_M).contains(&(upper - lower));
+                if let Some(tree) = tree.filter(|_| slides) {
                     falls_out(&mut said, model, tree, index, upper - lower);
                 }
             }

@@ -219,7 +219,11 @@ fn from_uri(path: &Path, uri: &str, most: u64) -> std::result::Result<Vec<u8>, S
     if !file.is_file() {
         return Err(format!("is in {}, which is not there", xml::brief(uri)));
     }
-    xml::read_bytes(&file, most).map_err(|e| e.to_string())
+    let bytes = xml::read_bytes(&file, most).map_err(|e| e.to_string())?;
+    if kinds::is_pointer(&bytes) {
+        return Err(format!("is in {}, a Git LFS pointer; run `git lfs pull`", xml::brief(uri)));
+    }
+    Ok(bytes)
 }
 
 /// Where a URI of a file points: in or below the model's folder.
@@ -283,6 +287,9 @@ impl File {
         for (i, image) in list(&self.json, "images").iter().enumerate() {
             let Some(uri) = image["uri"].as_str().filter(|u| !u.starts_with("data:")) else { continue };
             match beside(path, uri) {
+                Ok(file) if kinds::is_pointer(&kinds::head(&file)) => {
+                    out.push(format!("image {i} is in {}, a Git LFS pointer; run `git lfs pull`", xml::brief(uri)));
+                }
                 Ok(file) if file.is_file() => {}
                 Ok(_) => out.push(format!("image {i} is in {}, which is not there", xml::brief(uri))),
                 Err(why) => out.push(format!("image {i} {why}")),

@@ -11,9 +11,17 @@ pub(super) const WANTED: &str =
 /// As much as tells one kind from another, bytes.
 const HEAD: u64 = 4096;
 
+/// How a Git LFS pointer begins.
+const LFS: &[u8] = b"version https://git-lfs";
+
+/// Whether bytes are those of a Git LFS pointer, which stands for a file that was not fetched.
+pub(super) fn is_pointer(bytes: &[u8]) -> bool {
+    bytes.starts_with(LFS)
+}
+
 /// How files begin that are no models, and what they are.
 const MAGIC: [(&[u8], &str); 14] = [
-    (b"version https://git-lfs", "is a Git LFS pointer, not the file that it stands for; run `git lfs pull`"),
+    (LFS, "is a Git LFS pointer, not the file that it stands for; run `git lfs pull`"),
     (b"\x1f\x8b", "is compressed with gzip; unpack it first (gunzip)"),
     (b"BZh", "is compressed with bzip2; unpack it first (bunzip2)"),
     (b"\xfd7zXZ", "is compressed with xz; unpack it first (unxz)"),
@@ -85,7 +93,7 @@ pub(super) fn foreign(path: &Path, bytes: &[u8]) -> Option<String> {
         return Some(format!("is {what}"));
     }
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-    if ["obj", "stl", "ply", "msh", "fbx", "3mf", "off"].contains(&extension.as_str()) {
+    if !bytes.is_empty() && ["obj", "stl", "ply", "msh", "fbx", "3mf", "off"].contains(&extension.as_str()) {
         return Some(format!("is a mesh (.{extension}), not a model that names meshes"));
     }
     let is_text = !text.is_empty() && !text.contains(&0) && std::str::from_utf8(&bytes[..bytes.len().min(64)]).is_ok();

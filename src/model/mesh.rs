@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::xml;
+use super::{kinds, xml};
 use crate::math::{Point, Vector};
 
 /// Where a mesh lies: beside the model, below one of `folders`, or, for `package://name/...`, below a folder above the
@@ -63,7 +63,7 @@ const MIN_VERTICES: usize = 4;
 
 impl Vertices {
     fn add(&mut self, p: [f64; 3]) {
-        // Comparisons pass over what is no number; a sum does not.
+        // Comparisons would pass over what is no number.
         if p.iter().all(|x| x.is_finite()) {
             self.low = self.low.inf(&Vector::from(p));
             self.high = self.high.sup(&Vector::from(p));
@@ -103,7 +103,7 @@ pub(super) fn measured(path: &Path) -> Measured {
         Err(e) => return Measured { bounds: Err(e.to_string()), refused: None },
     };
     let pointer = "is a Git LFS pointer, not the mesh (run `git lfs pull`)";
-    if bytes.starts_with(b"version https://git-lfs") {
+    if kinds::is_pointer(&bytes) {
         return Measured { bounds: Err(format!("it {pointer}")), refused: Some(pointer.to_owned()) };
     }
     let kind = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
@@ -111,17 +111,17 @@ pub(super) fn measured(path: &Path) -> Measured {
         Vertices { low: Vector::repeat(f64::INFINITY), high: Vector::repeat(f64::NEG_INFINITY), distinct: Vec::new() };
     let mut refused = None;
     match kind.as_str() {
-        "obj" => text_vertices(&bytes, "v", &mut |p| vertices.add(p)),
+        "obj" => text_vertices(&bytes, "v", &mut |p: [f64; 3]| vertices.add(p)),
         "stl" => match binary_triangles(&bytes) {
             Some(triangles) => {
-                corners(triangles, &mut |p| vertices.add(p));
+                corners(triangles, &mut |p: [f64; 3]| vertices.add(p));
                 let faces = triangles.len() / TRIANGLE;
                 if faces > MAX_FACES {
                     refused = Some(format!("has {faces} faces, more than {MAX_FACES} in one STL"));
                 }
             }
             None => {
-                text_vertices(&bytes, "vertex", &mut |p| vertices.add(p));
+                text_vertices(&bytes, "vertex", &mut |p: [f64; 3]| vertices.add(p));
                 refused = Some("is no whole binary STL (text, cut off, or longer than it says)".to_owned());
             }
         },

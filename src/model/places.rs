@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::check::{MAX_SLIDE_M, Said};
+use super::check::{MAX_SLIDE_M, Said, plain};
 use super::glb::{Places, SHARES, Scene};
 use super::{Model, Tree};
 use crate::articulation::JointKind;
@@ -28,7 +28,7 @@ pub(super) fn animations(scene: &Scene, twin: Option<&Twin>) -> Said {
         }
         match moved.kind {
             JointKind::Prismatic if moved.reaches > MAX_SLIDE_M => {
-                said.fault(format!("{name}: its animation slides it by {:.3} m; glTF is in metres", moved.reaches));
+                said.fault(format!("{name}: its animation slides it by {} m; glTF is in metres", plain(moved.reaches)));
             }
             JointKind::Revolute if moved.reaches > std::f64::consts::TAU + 1e-6 => {
                 let degrees = moved.reaches.to_degrees();

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::check::{MAX_SLIDE_M, Said};
+use super::check::{MAX_SLIDE_M, Said, plain};
 use super::gltf_file::{index, list};
 use super::xml;
 
@@ -105,12 +105,13 @@ fn ends(said: &mut Said, name: &str, limit: &PhysicsLimit) {
     };
     let (unit, most, wanted) =
         if limit.is_angular { ("rad", std::f64::consts::TAU, "radians") } else { ("m", MAX_SLIDE_M, "metres") };
+    let [low, high] = [lower, upper].map(plain);
     if lower > upper {
-        said.fault(format!("{name}: lower limit {lower} is above upper limit {upper}; swap them"));
+        said.fault(format!("{name}: lower limit {low} is above upper limit {high}; swap them"));
     } else if upper - lower > most {
-        said.fault(format!("{name}: goes from {lower} to {upper} {unit}; limits are {wanted} here"));
+        said.fault(format!("{name}: goes from {low} to {high} {unit}; limits are {wanted} here"));
     } else if upper > lower && !(lower..=upper).contains(&0.0) {
-        said.tell(format!("{name}: 0 is outside its limits {lower} to {upper}"));
+        said.tell(format!("{name}: 0 is outside its limits {low} to {high}"));
     }
 }
 

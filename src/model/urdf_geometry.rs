@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use super::mesh::{self, Measured};
 use super::shapes::Primitive;
 use super::xml::{self, Element};
-use super::{Link, Shape};
+use super::{Link, Shape, kinds};
 use crate::error::Result;
 use crate::math::Vector;
 
@@ -227,11 +227,13 @@ impl<'a> Geometry<'a> {
 
     /// Looks for a picture.
     pub fn texture(&mut self, owner: &str, file: &str) {
-        if mesh::find(self.path, &[], &file.replace('\\', "/")).is_none() {
-            let shown = xml::brief(file);
-            self.faults
-                .push(format!("{owner}: texture {shown} is not there: viewers complain and show the part without"));
-        }
+        let what = match mesh::find(self.path, &[], &file.replace('\\', "/")) {
+            None => "is not there",
+            Some(found) if kinds::is_pointer(&kinds::head(&found)) => "is a Git LFS pointer (run `git lfs pull`)",
+            Some(_) => return,
+        };
+        let shown = xml::brief(file);
+        self.faults.push(format!("{owner}: texture {shown} {what}: viewers complain and show the part without"));
     }
 
     /// Tells at the end what concerns many meshes at once.
