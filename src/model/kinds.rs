@@ -123,8 +123,8 @@ mod tests {
 
     #[test]
     fn files_of_other_kinds_are_called_what_they_are() {
-        for (name, bytes, word) in [
-            ("a.urdf", &b"version https://git-lfs.github.com/spec/v1\noid sha256:aa"[..], "Git LFS pointer"),
+        let cases: [(&str, &[u8], &str); 10] = [
+            ("a.urdf", b"version https://git-lfs.github.com/spec/v1\noid sha256:aa", "Git LFS pointer"),
             ("a.urdf.gz", b"\x1f\x8b\x08\0", "gzip"),
             ("a.usda", b"#usda 1.0\n", "OpenUSD"),
             ("a.usdz", b"PK\x03\x04", "usdz"),
@@ -134,7 +134,8 @@ mod tests {
             ("a.obj", b"v 1 2 3\n", "a mesh (.obj)"),
             ("a.txt", b"0.1 0.2 0.3\n", "without any XML"),
             ("a.urdf", b"\xff\xfe<\0", "UTF-16"),
-        ] {
+        ];
+        for (name, bytes, word) in cases {
             let told = foreign(Path::new(name), bytes).unwrap_or_default();
             assert!(told.contains(word), "{name}: {told}");
         }

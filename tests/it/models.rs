@@ -13,7 +13,7 @@ fn data(name: &str) -> PathBuf {
 
 /// Faults with the numbers of their points.
 fn faults(points: &[Point]) -> Vec<(u8, String)> {
-    points.iter().flat_map(|p| p.faults.iter().map(|f| (p.id, f.clone()))).collect()
+    points.iter().flat_map(|p| p.faults.iter().map(move |f| (p.id, f.clone()))).collect()
 }
 
 #[test]
