@@ -242,8 +242,8 @@ impl<'a> Geometry<'a> {
         let count = self.unfound.len();
         let others = if count > 1 { format!(" and {} more", count - 1) } else { String::new() };
         self.faults.push(format!(
-            "mesh {first}{others}: MuJoCo does not look for packages and refuses the file; write paths from the model's folder, \
-             or add <mujoco><compiler strippath=\"true\" meshdir=\"...\"/></mujoco>"
+            "mesh {first}{others}: MuJoCo does not look for packages (nor for file://, nor outside meshdir) and refuses the file; \
+             write paths from the model's folder, or add <mujoco><compiler strippath=\"true\" meshdir=\"...\"/></mujoco>"
         ));
     }
 }
