@@ -16,7 +16,8 @@ use crate::twin::Twin;
 
 #[derive(Debug, Args)]
 pub struct CheckArgs {
-    /// URDF, MJCF and GLB files, or folders with such files; a folder of `paws twin` is also held to its twin.json
+    /// URDF, MJCF and glTF files (.glb, .gltf), or folders with such files; a folder of `paws twin` is also held to its
+    /// twin.json. A file that cannot be read says why; the others are judged
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
     /// Print JSON instead of a table
@@ -28,6 +29,9 @@ pub struct CheckArgs {
 #[derive(Debug, Serialize)]
 struct Checked {
     file: String,
+    /// Why it could not be read; there are no points then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<String>,
     points: Vec<Point>,
     /// What was not read.
     notes: Vec<String>,
@@ -37,25 +41,47 @@ struct Checked {
 const SHOWN: usize = 20;
 
 pub fn run(args: &CheckArgs) -> anyhow::Result<Answer> {
-    let mut all = Vec::new();
-    for input in &args.inputs {
-        if input.is_dir() {
-            let twin = match input.join("twin.json") {
-                file if file.is_file() => Some(super::export::read_twin(&file)?),
-                _ => None,
-            };
-            for file in models_in(input)? {
-                all.push(checked(&file, twin.as_ref())?);
-            }
-        } else {
-            all.push(checked(input, None)?);
-        }
+    let all: Vec<Checked> = args.inputs.iter().flat_map(|input| judged(input)).collect();
+    let errors: Vec<&str> = all.iter().filter_map(|c| c.error.as_deref()).collect();
+    if errors.len() == all.len() {
+        bail!("{}", errors.join("\n"));
+    }
+    for error in &errors {
+        eprintln!("error: {error}");
     }
     print(&if args.json { json::text(&all)? } else { table(&all) })?;
     // What was not judged is no yes.
     let is_no = |p: &Point| matches!(p.verdict, Verdict::Fail | Verdict::NotJudged);
     let no = all.iter().flat_map(|c| &c.points).any(is_no);
-    Ok(if no { Answer::No } else { Answer::Yes })
+    Ok(if no || !errors.is_empty() { Answer::No } else { Answer::Yes })
+}
+
+/// A file, or the models of a folder.
+fn judged(input: &Path) -> Vec<Checked> {
+    if !input.is_dir() {
+        return vec![told(input, checked(input, None))];
+    }
+    let mut all = Vec::new();
+    let twin_file = input.join("twin.json");
+    let twin = if twin_file.is_file() { super::export::read_twin(&twin_file).map(Some) } else { Ok(None) };
+    let twin = twin.unwrap_or_else(|e| {
+        all.push(told(&twin_file, Err(e)));
+        None
+    });
+    match models_in(input) {
+        Ok(files) => all.extend(files.iter().map(|file| told(file, checked(file, twin.as_ref())))),
+        Err(e) => all.push(told(input, Err(e))),
+    }
+    all
+}
+
+/// What is told of a file, be it why it was not read.
+fn told(file: &Path, result: anyhow::Result<(Vec<Point>, Vec<String>)>) -> Checked {
+    let (error, (points, notes)) = match result {
+        Ok(said) => (None, said),
+        Err(e) => (Some(format!("{e:#}")), (Vec::new(), Vec::new())),
+    };
+    Checked { file: shown(file), error, points, notes }
 }
 
 /// The models right in a folder, by name.
@@ -65,9 +91,9 @@ fn models_in(dir: &Path) -> anyhow::Result<Vec<PathBuf>> {
         let path = entry.with_context(|| shown(dir))?.path();
         let is_model = path.is_file()
             && match extension(&path).as_str() {
-                "urdf" | "glb" | "mjcf" => true,
+                "urdf" | "glb" | "gltf" | "mjcf" => true,
                 // Much else is XML too.
-                "xml" => model::root_name(&path).is_ok_and(|name| name == "mujoco"),
+                "xml" => model::root_name(&path).is_ok_and(|name| name == "mujoco" || name == "robot"),
                 _ => false,
             };
         if is_model {
@@ -75,7 +101,7 @@ fn models_in(dir: &Path) -> anyhow::Result<Vec<PathBuf>> {
         }
     }
     if found.is_empty() {
-        bail!("{}: no URDF, MJCF (.xml, .mjcf) or GLB file in it", shown(dir));
+        bail!("{}: no URDF (.urdf, .xml), MJCF (.xml, .mjcf) or glTF (.glb, .gltf) file in it", shown(dir));
     }
     Ok(found.into_iter().collect())
 }
@@ -84,15 +110,14 @@ fn extension(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
 }
 
-fn checked(path: &Path, twin: Option<&Twin>) -> anyhow::Result<Checked> {
-    let (points, notes) = if extension(path) == "glb" {
+/// Points and notes of one file.
+fn checked(path: &Path, twin: Option<&Twin>) -> anyhow::Result<(Vec<Point>, Vec<String>)> {
+    if model::is_gltf(path) {
         let scene = glb::read(path)?;
-        (check::scene(&scene, twin), scene.notes)
-    } else {
-        let model = model::read(path)?;
-        (check::model(&model, twin), model.notes)
-    };
-    Ok(Checked { file: shown(path), points, notes })
+        return Ok((check::scene(&scene, twin), scene.notes));
+    }
+    let model = model::read(path)?;
+    Ok((check::model(&model, twin), model.notes))
 }
 
 fn table(all: &[Checked]) -> String {
@@ -104,6 +129,7 @@ fn table(all: &[Checked]) -> String {
         row.extend(all.iter().map(|c| {
             let verdict = c.points.iter().find(|p| p.id == id).map(|p| p.verdict);
             match verdict {
+                None if c.error.is_some() => "not read",
                 Some(Verdict::Pass) => "ok",
                 Some(Verdict::Fail) => "FAIL",
                 Some(Verdict::NotJudged) => "?",

@@ -61,7 +61,7 @@ enum Command {
     Infer(infer::InferArgs),
     /// Write a twin, or joints that another program found, as URDF, MJCF, glTF and USD
     Export(export::ExportArgs),
-    /// Check a model without simulating it: limits, masses, names, collisions of anybody's URDF, MJCF or GLB
+    /// Check a model without simulating it: limits, masses, names, collisions, missing files of anybody's URDF, MJCF or glTF
     Check(check::CheckArgs),
     /// Replay recorded hands on the joints of a twin, or of anybody's URDF or MJCF, in a physics engine
     Validate(validate::ValidateArgs),

@@ -9,7 +9,9 @@ use serde::Serialize;
 
 use super::glb::Scene;
 use super::masses::masses;
+use super::parts::parts;
 use super::places::{animations, places, same_places};
+use super::rigid_bodies;
 use super::sweep::sweep;
 use super::{Format, Kind, Model, ModelJoint, Shape, Tree, traps};
 use crate::articulation::JointKind;
@@ -143,7 +145,9 @@ pub fn model(model: &Model, twin: Option<&Twin>) -> Vec<Point> {
 /// All points about a glTF scene; `twin` is the model that the file was written from, where there is one.
 #[must_use]
 pub fn scene(scene: &Scene, twin: Option<&Twin>) -> Vec<Point> {
-    let mut said = BTreeMap::from([(1, Said::about(true)), (7, animations(scene, twin))]);
+    let there = |missing: &String| format!("{missing}; viewers refuse the file, or show it without");
+    let loads = Said { concerned: true, faults: scene.missing.iter().map(there).collect(), ..Said::default() };
+    let mut said = BTreeMap::from([(1, loads), (2, rigid_bodies::limits(&scene.joints)), (7, animations(scene, twin))]);
     // A file for physics engines must not be animated; what moves in it is not told by where its nodes are.
     if let Some(twin) = twin.filter(|_| !scene.is_physics) {
         said.insert(9, same_places(twin, &scene.places));
@@ -153,16 +157,27 @@ pub fn scene(scene: &Scene, twin: Option<&Twin>) -> Vec<Point> {
 
 fn loads(model: &Model, tree: Option<&Tree>, broken: Vec<String>) -> Said {
     let mut said = Said { concerned: true, faults: broken, ..Said::default() };
-    if let Format::Urdf { complaint: Some(complaint), .. } = &model.format {
-        said.fault(format!("urdf-rs, and whoever reads with it, refuses the file: {complaint}"));
+    if let Format::Urdf { complaint, faults, .. } = &model.format {
+        said.faults.extend(faults.iter().cloned());
+        if let Some(complaint) = complaint {
+            said.fault(format!("urdf-rs, and whoever reads with it, refuses the file: {complaint}"));
+        }
     }
     traps::floating(&mut said, model, tree);
     said
 }
 
+/// A number for people: large and small ones with their power of ten.
+pub(super) fn plain(value: f64) -> String {
+    let size = value.abs();
+    if size == 0.0 || (1e-6..1e7).contains(&size) { value.to_string() } else { format!("{value:e}") }
+}
+
 /// An opening for people.
 fn amount(kind: JointKind, value: f64) -> String {
     match kind {
+        JointKind::Revolute if value >= 1e7 => format!("{value:e} rad"),
+        JointKind::Prismatic if value >= 1e7 => format!("{value:e} m"),
         JointKind::Revolute => format!("{value:.4} rad ({:.1}°)", value.to_degrees()),
         JointKind::Prismatic => format!("{value:.4} m"),
     }
@@ -177,7 +192,8 @@ fn limits(model: &Model, tree: Option<&Tree>) -> Said {
         match (joint.lower, joint.upper) {
             (Some(lower), Some(upper)) => {
                 range(&mut said, model, joint, kind, [lower, upper]);
-                if let Some(tree) = tree.filter(|_| kind == JointKind::Prismatic && lower < upper) {
+                let slides = kind == JointKind::Prismatic && (0.0..=MAX_SLIDE_M).contains(&(upper - lower));
+                if let Some(tree) = tree.filter(|_| slides) {
                     falls_out(&mut said, model, tree, index, upper - lower);
                 }
             }
@@ -215,24 +231,29 @@ fn range(said: &mut Said, model: &Model, joint: &ModelJoint, kind: JointKind, [l
     if traps::unlimited(said, model, joint, [lower, upper]) {
         return;
     }
+    let [low, high] = [lower, upper].map(plain);
     if lower > upper {
-        said.fault(format!("{name}: lower limit {lower} is above upper limit {upper}; swap them"));
+        said.fault(format!(
+            "{name}: lower limit {low} is above upper limit {high}, which MuJoCo takes for no limits; swap them"
+        ));
         return;
     }
     if lower == upper {
-        said.fault(format!("{name}: limits {lower} to {upper} lock it; widen them, or make it fixed"));
+        said.fault(format!(
+            "{name}: limits {low} to {high} lock it, and MuJoCo takes them for no limits; widen them, or make it fixed"
+        ));
         return;
     }
     traps::begins(said, joint);
     if !(lower..=upper).contains(&joint.start) {
         said.fault(format!(
-            "{name}: {}, where every simulator begins, is outside its limits {lower} to {upper}; move the joint's frame \
+            "{name}: {}, where every simulator begins, is outside its limits {low} to {high}; move the joint's frame \
              so that closed is 0",
             joint.start
         ));
     } else if lower != joint.start {
         said.tell(format!(
-            "{name}: lower limit {lower}: {} is not its lower end; closed is taken to be the end nearest to 0",
+            "{name}: lower limit {low}: {} is not its lower end; closed is taken to be the end nearest to 0",
             joint.start
         ));
     }
@@ -391,6 +412,7 @@ fn names(model: &Model, tree: Option<&Tree>) -> Said {
     }
     let Some(tree) = tree else { return said };
     traps::untouchable(&mut said, model, tree);
+    parts(&mut said, model, tree);
     for (index, joint) in model.moving() {
         let Some(child) = tree.carrier.iter().position(|c| *c == Some(index)) else { continue };
         if !model.links[child].between && handle(model, tree, child).is_none() {
@@ -513,7 +535,7 @@ mod tests {
         Model {
             name: "c".to_owned(),
             source: PathBuf::from("c.urdf"),
-            format: Format::Urdf { keeps_links: true, complaint: None },
+            format: Format::Urdf { keeps_links: true, complaint: None, faults: Vec::new() },
             links: vec![
                 world,
                 // A board behind a door that opens towards -y, about its left edge.

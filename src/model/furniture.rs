@@ -1,6 +1,6 @@
 //! A model as furniture: one piece for each joint that moves, in the world frame with everything closed.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use nalgebra::Matrix3;
 

@@ -1,18 +1,19 @@
-//! What a glTF file (`.glb`) does when its animations run: where things are, and how far it opens.
+//! What a glTF file (`.glb`, `.gltf`) does when its animations run: where things are, and how far it opens.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use gltf::accessor::{DataType, Dimensions};
-use gltf::animation::{Interpolation, Property};
 use nalgebra::{Matrix4, Quaternion, UnitQuaternion};
+use serde_json::Value;
 
-use super::xml;
+use super::gltf_file::{self, File, Why, index, list, row};
+pub use super::rigid_bodies::{PhysicsJoint, PhysicsLimit};
+use super::{gltf_extensions, rigid_bodies, xml};
+use crate::articulation::JointKind;
 use crate::error::{Error, Result};
 use crate::math::{Point, Vector};
 
-/// Scenes of furniture are boxes; what is larger than this is none.
-const MAX_BYTES: u64 = 256 << 20;
+/// Nodes times channels, and keyframes of all channels together: furniture has far fewer.
 const MAX_WORK: usize = 20_000_000;
 
 /// Where something is when a joint is closed, half open and open; world, +Z up, metres.
@@ -26,7 +27,9 @@ pub const SHARES: [f64; 3] = [0.0, 0.5, 1.0];
 pub struct Moved {
     /// The node's name.
     pub name: String,
-    /// How far the animation opens it, rad or m.
+    /// Whether it turns or slides.
+    pub kind: JointKind,
+    /// How far the animation opens it, rad or m; metres are those of the world.
     pub reaches: f64,
     /// Upper limit in the node's extras (`joint.upper`), rad or m.
     pub upper: Option<f64>,
@@ -45,8 +48,16 @@ pub struct Scene {
     pub places: BTreeMap<String, Places>,
     /// The file describes rigid bodies and joints for a physics engine (`KHR_physics_rigid_bodies`).
     pub is_physics: bool,
+    /// Its joints for a physics engine.
+    pub joints: Vec<PhysicsJoint>,
     /// Extensions without which the file cannot be shown.
     pub required: Vec<String>,
+    /// Files and bytes that it names and that are not there.
+    pub missing: Vec<String>,
+    /// What breaks the format's rules.
+    pub faults: Vec<String>,
+    /// What its extensions mean for what is judged here.
+    pub told: Vec<String>,
     /// What was not read.
     pub notes: Vec<String>,
 }
@@ -63,181 +74,303 @@ enum Values {
 }
 
 /// A node's value at a key or between two.
-enum Value {
+enum Placed {
     Turn(UnitQuaternion<f64>),
     Shift(Vector),
 }
 
-/// Reads a binary glTF file.
+/// A node as it stands in the file.
+struct Node {
+    name: Option<String>,
+    children: Vec<usize>,
+    translation: Vector,
+    rotation: UnitQuaternion<f64>,
+    scale: Vector,
+    /// Instead of the three.
+    matrix: Option<Matrix4<f64>>,
+}
+
+/// Reads a glTF file, binary or text.
 ///
 /// # Errors
-/// Where it cannot be read or is no valid glTF.
+/// Where it cannot be read, is no glTF 2, refers to what it does not have, or its nodes are no trees.
 pub fn read(path: &Path) -> Result<Scene> {
-    let bytes = xml::read_bytes(path, MAX_BYTES)?;
-    let fault = |text: &str| Error::format(path, "glTF", format!("is not valid ({})", xml::brief(text)));
-    // The crate takes the header's length for granted.
-    let length = bytes.get(8..12).and_then(|b| b.try_into().ok()).map_or(0, u32::from_le_bytes);
-    if bytes.starts_with(b"glTF") && (length as usize) < 12 {
-        return Err(fault("its header states no length"));
-    }
-    let file = gltf::Gltf::from_slice(&bytes).map_err(|e| fault(&e.to_string()))?;
-    let blob = file.blob.as_deref().unwrap_or_default();
-    let nodes: Vec<gltf::Node> = file.nodes().collect();
-    let mut parents: Vec<Option<usize>> = vec![None; nodes.len()];
-    for node in &nodes {
-        for child in node.children() {
-            parents[child.index()] = Some(node.index());
-        }
-    }
-    let channels: usize = file.animations().map(|a| a.channels().count()).sum();
-    if nodes.len().saturating_mul(channels) > MAX_WORK {
-        return Err(fault("too many nodes and animations for a piece of furniture"));
-    }
+    let file = gltf_file::open(path)?;
+    let json = &file.json;
     let mut scene = Scene {
         source: path.to_owned(),
         moved: Vec::new(),
         places: BTreeMap::new(),
-        is_physics: file.extensions_used().any(|e| e == "KHR_physics_rigid_bodies"),
-        required: file.extensions_required().map(str::to_owned).collect(),
+        is_physics: gltf_extensions::uses(json, rigid_bodies::NAME),
+        joints: rigid_bodies::joints(json),
+        required: gltf_extensions::required(json),
+        missing: file.missing(path),
+        faults: gltf_extensions::faults(json),
+        told: gltf_extensions::told(json),
         notes: Vec::new(),
     };
-    let still: Vec<Matrix4<f64>> = nodes.iter().map(|n| matrix(n.transform().matrix())).collect();
-    for animation in file.animations() {
-        for channel in animation.channels() {
-            let node = channel.target().node().index();
-            let name = nodes[node].name().map_or_else(|| format!("node {node}"), str::to_owned);
-            let channel = match keys(&channel, blob) {
-                Ok(channel) => channel,
-                Err(why) => {
-                    scene.notes.push(format!("{name}: its animation is not read: {why}"));
-                    continue;
-                }
-            };
-            let (open, reaches) = channel.farthest();
-            let above = parents[node].map_or(Matrix4::identity(), |p| world(p, &still, &parents));
-            for (k, share) in SHARES.into_iter().enumerate() {
-                let (from, to) = (channel.times[0], channel.times[open]);
-                let local = replaced(&nodes[node], &channel.at(from + (to - from) * share));
-                let mut seen = BTreeSet::from([node]);
-                let mut todo = vec![(node, above * local)];
-                while let Some((i, pose)) = todo.pop() {
-                    if let Some(name) = nodes[i].name() {
-                        let p = pose.transform_point(&Point::origin());
-                        // glTF's +Y up is our +Z up.
-                        let places = scene.places.entry(name.to_owned()).or_insert([Point::origin(); 3]);
-                        places[k] = Point::new(p.x, -p.z, p.y);
-                    }
-                    let below = nodes[i].children().map(|c| c.index()).filter(|c| seen.insert(*c));
-                    todo.extend(below.map(|c| (c, pose * still[c])));
-                }
+    if file.trailing > 0 {
+        scene.notes.push(format!("{} bytes follow the end that its header states", file.trailing));
+    }
+    if list(json, "scenes").iter().all(|s| list(s, "nodes").is_empty()) && !list(json, "nodes").is_empty() {
+        scene.told.push("no scene of it shows a node: viewers show nothing".to_owned());
+    }
+    let nodes: Vec<Node> = list(json, "nodes").iter().enumerate().map(|(i, n)| node(i, n, &mut scene.faults)).collect();
+    let fault = |text: &str| Error::format(path, "glTF", format!("is not valid ({text})"));
+    let parents = parents(&nodes).map_err(|e| fault(&e))?;
+    let still: Vec<Matrix4<f64>> = nodes.iter().map(Node::local).collect();
+    let channels: usize = list(json, "animations").iter().map(|a| list(a, "channels").len()).sum();
+    if nodes.len().saturating_mul(channels) > MAX_WORK {
+        return Err(fault("too many nodes and animations for a piece of furniture"));
+    }
+    let mut left = MAX_WORK;
+    for animation in list(json, "animations") {
+        for channel in list(animation, "channels") {
+            let Some((target, path)) = target(channel, nodes.len(), &mut scene.notes) else { continue };
+            let Some(moved_node) = nodes.get(target) else { continue };
+            let name = moved_node.name.clone().unwrap_or_else(|| format!("node {target}"));
+            if moved_node.matrix.is_some() {
+                scene.faults.push(format!(
+                    "{name}: is animated and has a matrix; write translation, rotation and scale instead"
+                ));
+                continue;
             }
-            let extras =
-                nodes[node].extras().as_ref().and_then(|e| serde_json::from_str::<serde_json::Value>(e.get()).ok());
-            let upper = extras.and_then(|e| e["joint"]["upper"].as_f64());
-            let is_pivot = nodes[node].children().next().is_some();
-            scene.moved.push(Moved { name, reaches, upper, is_pivot });
+            let keys = keys(&file, animation, channel, path);
+            let keys = keys.and_then(|k| match left.checked_sub(k.times.len()) {
+                Some(rest) => {
+                    left = rest;
+                    Ok(k)
+                }
+                None => Err(Why::NotRead("there are too many keyframes".to_owned())),
+            });
+            match keys {
+                Ok(keys) => {
+                    let above = world(parents.get(target).copied().flatten(), &still, &parents);
+                    let tree = Hung { nodes: &nodes, still: &still, above };
+                    let moved = tree.moved(target, &name, &keys, &list(json, "nodes")[target], &mut scene.places);
+                    if moved.reaches > 0.0 {
+                        scene.moved.push(moved);
+                    } else {
+                        scene.notes.push(format!("{name}: its animation moves nothing"));
+                    }
+                }
+                Err(Why::NotRead(why)) => scene.notes.push(format!("{name}: its animation is not read: {why}")),
+                Err(Why::Broken(why)) => scene.faults.push(format!("{name}: its animation is broken: {why}")),
+            }
         }
+    }
+    let lost: Vec<&String> = scene
+        .places
+        .iter()
+        .filter(|(_, p)| p.iter().any(|p| !p.coords.iter().all(|x| x.is_finite())))
+        .map(|(n, _)| n)
+        .collect();
+    if let Some(name) = lost.first() {
+        scene.faults.push(format!("{name}: its place is beyond all numbers; look at the scales and shifts above it"));
     }
     Ok(scene)
 }
 
-fn matrix(columns: [[f32; 4]; 4]) -> Matrix4<f64> {
-    Matrix4::from_fn(|r, c| f64::from(columns[c][r]))
+fn node(number: usize, value: &Value, faults: &mut Vec<String>) -> Node {
+    let name = value["name"].as_str().map(str::to_owned);
+    let label = || name.clone().unwrap_or_else(|| format!("node {number}"));
+    let mut wrong = |key: &str, count: usize| faults.push(format!("{}: its {key} is not {count} numbers", label()));
+    let three = |key: &str| if value[key].is_null() { Some(None) } else { row::<3>(value, key).map(Some) };
+    let translation = three("translation").unwrap_or_else(|| {
+        wrong("translation", 3);
+        None
+    });
+    let scale = three("scale").unwrap_or_else(|| {
+        wrong("scale", 3);
+        None
+    });
+    let matrix = row::<16>(value, "matrix");
+    if matrix.is_none() && !value["matrix"].is_null() {
+        wrong("matrix", 16);
+    }
+    let [x, y, z, w] = row::<4>(value, "rotation").unwrap_or_else(|| {
+        if !value["rotation"].is_null() {
+            wrong("rotation", 4);
+        }
+        [0.0, 0.0, 0.0, 1.0]
+    });
+    let quaternion = Quaternion::new(w, x, y, z);
+    // What a validator forgives of rounding.
+    if (quaternion.norm() - 1.0).abs() > 1e-2 {
+        faults.push(format!(
+            "{}: its rotation has length {:.3}; a quaternion of length 1 is wanted",
+            label(),
+            quaternion.norm()
+        ));
+    }
+    Node {
+        children: list(value, "children")
+            .iter()
+            .filter_map(|c| c.as_u64().and_then(|c| usize::try_from(c).ok()))
+            .collect(),
+        translation: translation.map_or_else(Vector::zeros, Vector::from),
+        rotation: UnitQuaternion::try_new(quaternion, 1e-9).unwrap_or_else(UnitQuaternion::identity),
+        scale: scale.map_or_else(|| Vector::repeat(1.0), Vector::from),
+        matrix: matrix.map(|m| Matrix4::from_column_slice(&m)),
+        name,
+    }
 }
 
-/// `world_from_node`; a cycle of ancestors is left where it closes.
-fn world(node: usize, local: &[Matrix4<f64>], parents: &[Option<usize>]) -> Matrix4<f64> {
-    let mut seen = BTreeSet::new();
+impl Node {
+    /// `parent_from_node` as the file has it.
+    fn local(&self) -> Matrix4<f64> {
+        self.matrix.unwrap_or_else(|| self.with(None))
+    }
+
+    /// The same with one of its parts replaced.
+    fn with(&self, value: Option<&Placed>) -> Matrix4<f64> {
+        let (mut shift, mut turn) = (self.translation, self.rotation);
+        match value {
+            Some(Placed::Shift(s)) => shift = *s,
+            Some(Placed::Turn(t)) => turn = *t,
+            None => {}
+        }
+        Matrix4::new_translation(&shift) * turn.to_homogeneous() * Matrix4::new_nonuniform_scaling(&self.scale)
+    }
+}
+
+/// Each node's parent; `Err` where nodes are no trees.
+fn parents(nodes: &[Node]) -> std::result::Result<Vec<Option<usize>>, String> {
+    let mut parents: Vec<Option<usize>> = vec![None; nodes.len()];
+    for (i, node) in nodes.iter().enumerate() {
+        for child in &node.children {
+            if let Some(other) = parents.get_mut(*child).and_then(|p| p.replace(i)) {
+                return Err(format!("node {child} is the child of two nodes, {other} and {i}"));
+            }
+        }
+    }
+    // From the roots down every node of a tree is reached.
+    let mut todo: Vec<usize> = (0..nodes.len()).filter(|i| parents[*i].is_none()).collect();
+    let mut reached = vec![false; nodes.len()];
+    while let Some(i) = todo.pop() {
+        reached[i] = true;
+        todo.extend(&nodes[i].children);
+    }
+    match reached.iter().position(|r| !r) {
+        Some(i) => Err(format!("the children of node {i} lead back to it")),
+        None => Ok(parents),
+    }
+}
+
+/// `world_from_node`; the identity for what stands in the world.
+fn world(node: Option<usize>, local: &[Matrix4<f64>], parents: &[Option<usize>]) -> Matrix4<f64> {
     let mut pose = Matrix4::identity();
-    let mut here = Some(node);
-    while let Some(i) = here.filter(|i| seen.insert(*i)) {
+    let mut here = node;
+    while let Some(i) = here {
         pose = local[i] * pose;
         here = parents[i];
     }
     pose
 }
 
-/// The node's local transform with one of its parts replaced.
-fn replaced(node: &gltf::Node, value: &Value) -> Matrix4<f64> {
-    let (translation, rotation, scale) = node.transform().decomposed();
-    let [x, y, z, w] = rotation.map(f64::from);
-    let turn = match value {
-        Value::Turn(turn) => *turn,
-        Value::Shift(_) => UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)),
-    };
-    let shift = match value {
-        Value::Shift(shift) => *shift,
-        Value::Turn(_) => Vector::from(translation.map(f64::from)),
-    };
-    Matrix4::new_translation(&shift)
-        * turn.to_homogeneous()
-        * Matrix4::new_nonuniform_scaling(&Vector::from(scale.map(f64::from)))
+/// The node that a channel moves and how; `None`, and a note, where it moves none.
+fn target<'a>(channel: &'a Value, nodes: usize, notes: &mut Vec<String>) -> Option<(usize, &'a str)> {
+    let target = &channel["target"];
+    if let Some(pointer) = target["extensions"]["KHR_animation_pointer"]["pointer"].as_str() {
+        let inside = pointer.strip_prefix("/nodes/").and_then(|p| p.split_once('/'));
+        let moves = inside.filter(|(_, path)| ["rotation", "translation"].contains(path));
+        let found = moves.and_then(|(n, path)| Some((n.parse::<usize>().ok().filter(|n| *n < nodes)?, path)));
+        if found.is_none() {
+            notes.push(format!("what animates {} is not read", xml::brief(pointer)));
+        }
+        return found;
+    }
+    let found = index(target, "node").and_then(|n| Some((n, target["path"].as_str()?)));
+    if found.is_none() {
+        notes.push("an animation's channel moves no node and is passed over".to_owned());
+    }
+    found
 }
 
-/// Keyframes of a channel; `Err` says why they are not read.
-fn keys(channel: &gltf::animation::Channel, blob: &[u8]) -> std::result::Result<Channel, String> {
-    let sampler = channel.sampler();
-    if sampler.interpolation() != Interpolation::Linear {
-        return Err("only linear interpolation is".to_owned());
-    }
-    let times: Vec<f64> = floats(&sampler.input(), 1, blob)?.concat();
-    let values = match channel.target().property() {
-        Property::Rotation => {
-            let turn = |v: &Vec<f64>| UnitQuaternion::try_new(Quaternion::new(v[3], v[0], v[1], v[2]), 1e-6);
-            let turns: Option<Vec<_>> = floats(&sampler.output(), 4, blob)?.iter().map(turn).collect();
-            Values::Turns(turns.ok_or("a rotation is 0")?)
-        }
-        Property::Translation => {
-            Values::Shifts(floats(&sampler.output(), 3, blob)?.iter().map(|v| Vector::new(v[0], v[1], v[2])).collect())
-        }
-        Property::Scale | Property::MorphTargetWeights => return Err("it neither turns nor shifts".to_owned()),
+/// Keyframes of a channel that turns or shifts.
+fn keys(file: &File, animation: &Value, channel: &Value, path: &str) -> std::result::Result<Channel, Why> {
+    let broken = |text: &str| Why::Broken(text.to_owned());
+    let sampler = index(channel, "sampler").and_then(|s| list(animation, "samplers").get(s));
+    let sampler = sampler.ok_or_else(|| broken("it has no sampler"))?;
+    let width = match path {
+        "rotation" => 4,
+        "translation" => 3,
+        "scale" | "weights" => return Err(Why::NotRead("it neither turns nor shifts".to_owned())),
+        other => return Err(Why::Broken(format!("it animates \"{}\", which nodes do not have", xml::brief(other)))),
     };
-    let count = match &values {
-        Values::Turns(v) => v.len(),
-        Values::Shifts(v) => v.len(),
+    let accessor = |key: &str| index(sampler, key).ok_or_else(|| Why::Broken(format!("its sampler has no {key}")));
+    let times: Vec<f64> = file.rows(accessor("input")?, 1)?.concat();
+    let rows = file.rows(accessor("output")?, width)?;
+    // A spline's keyframe is a slope, the value, a slope.
+    let a_key = match sampler["interpolation"].as_str() {
+        None | Some("LINEAR" | "STEP") => 1,
+        Some("CUBICSPLINE") => 3,
+        Some(other) => return Err(Why::Broken(format!("\"{}\" is no interpolation", xml::brief(other)))),
     };
-    let rises = times.windows(2).all(|w| w[0] < w[1]);
-    if times.len() < 2 || times.len() != count || !rises {
-        return Err("it needs two keyframes at least, a value for each, and times that rise".to_owned());
+    if times.is_empty() || times.len().checked_mul(a_key) != Some(rows.len()) {
+        let (have, keys) = (rows.len(), times.len());
+        return Err(Why::Broken(format!("it has {have} values for {keys} keyframes, {a_key} for each are wanted")));
     }
+    if !times.windows(2).all(|w| w[0] < w[1]) {
+        return Err(broken("its times do not rise"));
+    }
+    let rows = rows.iter().skip(a_key / 2).step_by(a_key);
+    let values = if width == 4 {
+        let turn = |v: &Vec<f64>| match v[..] {
+            [x, y, z, w] => UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-6),
+            _ => None,
+        };
+        let turns: Option<Vec<_>> = rows.map(turn).collect();
+        Values::Turns(turns.ok_or_else(|| broken("a rotation is 0"))?)
+    } else {
+        Values::Shifts(rows.map(|v| Vector::from_column_slice(v)).collect())
+    };
     Ok(Channel { times, values })
 }
 
-/// Rows of single-precision numbers of an accessor into the file's own buffer.
-fn floats(accessor: &gltf::Accessor, width: usize, blob: &[u8]) -> std::result::Result<Vec<Vec<f64>>, String> {
-    let fits = match accessor.dimensions() {
-        Dimensions::Scalar => 1,
-        Dimensions::Vec3 => 3,
-        Dimensions::Vec4 => 4,
-        _ => 0,
-    };
-    if accessor.data_type() != DataType::F32 || fits != width || accessor.sparse().is_some() {
-        return Err(format!("its numbers are not plain floats, {width} a keyframe"));
-    }
-    let view = accessor.view().ok_or("its numbers are nowhere")?;
-    if !matches!(view.buffer().source(), gltf::buffer::Source::Bin) {
-        return Err("its numbers lie in another file".to_owned());
-    }
-    let stride = view.stride().unwrap_or(4 * width);
-    let outside = || "its numbers lie outside the file".to_owned();
-    let bytes =
-        view.offset().checked_add(view.length()).and_then(|end| blob.get(view.offset()..end)).ok_or_else(outside)?;
-    // More rows than bytes cannot be there.
-    if accessor.count() > bytes.len() {
-        return Err(outside());
-    }
-    let mut rows = Vec::new();
-    for i in 0..accessor.count() {
-        let start = i.checked_mul(stride).and_then(|s| s.checked_add(accessor.offset())).ok_or_else(outside)?;
-        let row = start.checked_add(4 * width).and_then(|end| bytes.get(start..end)).ok_or_else(outside)?;
-        let row: Vec<f64> =
-            row.chunks_exact(4).map(|b| f64::from(f32::from_le_bytes(b.try_into().unwrap_or([0; 4])))).collect();
-        if row.iter().any(|v| !v.is_finite()) {
-            return Err("a number is not finite".to_owned());
+/// Nodes with what is above the one that moves.
+struct Hung<'a> {
+    nodes: &'a [Node],
+    still: &'a [Matrix4<f64>],
+    above: Matrix4<f64>,
+}
+
+impl Hung<'_> {
+    /// What a channel does to a node; where all named nodes below are goes to `places`.
+    fn moved(
+        &self,
+        node: usize,
+        name: &str,
+        keys: &Channel,
+        json: &Value,
+        places: &mut BTreeMap<String, Places>,
+    ) -> Moved {
+        let (open, mut reaches) = keys.farthest();
+        if let Values::Shifts(shifts) = &keys.values {
+            // Metres of the world: scales above count.
+            reaches = self.above.transform_vector(&(shifts[open] - shifts[0])).norm();
         }
-        rows.push(row);
+        for (k, share) in SHARES.into_iter().enumerate() {
+            let (from, to) = (keys.times[0], keys.times[open]);
+            let local = self.nodes[node].with(Some(&keys.at(from + (to - from) * share)));
+            let mut todo = vec![(node, self.above * local)];
+            while let Some((i, pose)) = todo.pop() {
+                if let Some(name) = &self.nodes[i].name {
+                    let p = pose.transform_point(&Point::origin());
+                    // glTF's +Y up is our +Z up.
+                    let places = places.entry(name.clone()).or_insert([Point::origin(); 3]);
+                    places[k] = Point::new(p.x, -p.z, p.y);
+                }
+                todo.extend(self.nodes[i].children.iter().map(|c| (*c, pose * self.still[*c])));
+            }
+        }
+        let kind = match keys.values {
+            Values::Turns(_) => JointKind::Revolute,
+            Values::Shifts(_) => JointKind::Prismatic,
+        };
+        let is_pivot = !self.nodes[node].children.is_empty();
+        Moved { name: name.to_owned(), kind, reaches, upper: json["extras"]["joint"]["upper"].as_f64(), is_pivot }
     }
-    Ok(rows)
 }
 
 impl Channel {
@@ -272,14 +405,21 @@ impl Channel {
     }
 
     /// The value at a time, linear between keys.
-    fn at(&self, time: f64) -> Value {
+    fn at(&self, time: f64) -> Placed {
         let last = self.times.len() - 1;
+        // One keyframe holds still.
+        if last == 0 {
+            return match &self.values {
+                Values::Shifts(s) => Placed::Shift(s[0]),
+                Values::Turns(t) => Placed::Turn(t[0]),
+            };
+        }
         let i = self.times.partition_point(|t| *t <= time).clamp(1, last);
         let share = ((time - self.times[i - 1]) / (self.times[i] - self.times[i - 1])).clamp(0.0, 1.0);
         match &self.values {
-            Values::Shifts(s) => Value::Shift(s[i - 1].lerp(&s[i], share)),
+            Values::Shifts(s) => Placed::Shift(s[i - 1].lerp(&s[i], share)),
             // Half a turn has no shortest way; the first key is as good as any.
-            Values::Turns(t) => Value::Turn(t[i - 1].try_slerp(&t[i], share, 1e-9).unwrap_or(t[i - 1])),
+            Values::Turns(t) => Placed::Turn(t[i - 1].try_slerp(&t[i], share, 1e-9).unwrap_or(t[i - 1])),
         }
     }
 }
@@ -297,7 +437,7 @@ mod tests {
         let (open, reaches) = channel.farthest();
         assert_eq!(open, 3);
         assert!((reaches - 3.6).abs() < 1e-9);
-        let Value::Turn(half) = channel.at(1.5) else { panic!("a turn") };
+        let Placed::Turn(half) = channel.at(1.5) else { panic!("a turn") };
         assert!((half.angle() - 1.8).abs() < 1e-9);
     }
 

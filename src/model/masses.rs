@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::check::Said;
+use super::check::{Said, plain};
 use super::{Format, Link, MassSource, Model, Tree};
 use crate::math::Vector;
 use crate::twin::{Twin, mass_properties};
@@ -23,8 +23,12 @@ pub(super) fn masses(model: &Model, tree: Option<&Tree>, twin: Option<&Twin>) ->
         let name = &link.name;
         let bare = link.shapes.is_empty() && link.meshes.is_empty();
         let frame_only = bare && link.mass_source == MassSource::Nothing && !moving.contains(name.as_str());
-        // What stands in the world and never moves needs no mass; a link of the world's name is no body.
-        if link.between || frame_only || (Some(i) == root && name == super::mjcf::WORLD) {
+        // What is fixed to the world never moves and needs no mass; a link of the world's name is no body.
+        let in_world = tree
+            .zip(root)
+            .is_some_and(|(t, root)| t.body[i] == t.body[root] && model.links[root].name == super::mjcf::WORLD);
+        let massless = matches!(link.mass_source, MassSource::Nothing | MassSource::Assumed);
+        if link.between || frame_only || (in_world && (massless || Some(i) == root)) {
             continue;
         }
         // MuJoCo takes bodies without joints, and what is fixed to them, as parts of the world: no force moves them.
@@ -72,7 +76,7 @@ pub(super) fn masses(model: &Model, tree: Option<&Tree>, twin: Option<&Twin>) ->
 fn mass_of(said: &mut Said, link: &Link, mass: f64, is_furniture: bool) {
     let name = &link.name;
     if !(MIN_MASS_KG..=MAX_MASS_KG).contains(&mass) && (is_furniture || mass.is_nan() || mass <= 0.0) {
-        said.fault(format!("{name}: {mass} kg; furniture's parts weigh {MIN_MASS_KG} to {MAX_MASS_KG} kg"));
+        said.fault(format!("{name}: {} kg; furniture's parts weigh {MIN_MASS_KG} to {MAX_MASS_KG} kg", plain(mass)));
     }
     if !moments_of(said, link) || link.shapes.is_empty() || link.incomplete {
         return;
@@ -84,7 +88,9 @@ fn mass_of(said: &mut Said, link: &Link, mass: f64, is_furniture: bool) {
     }
     let outside = (0..3).map(|k| (low[k] - link.center[k]).max(link.center[k] - high[k])).fold(0.0, f64::max);
     if outside > 1e-6 {
-        said.fault(format!("{name}: its centre of mass lies {:.1} mm outside its boxes", 1000.0 * outside));
+        // Kilometres in millimetres would be a line of digits.
+        let far = if outside < 1e4 { format!("{:.1} mm", 1000.0 * outside) } else { format!("{} m", plain(outside)) };
+        said.fault(format!("{name}: its centre of mass lies {far} outside its boxes"));
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::xml;
+use super::{kinds, xml};
 use crate::math::{Point, Vector};
 
 /// Where a mesh lies: beside the model, below one of `folders`, or, for `package://name/...`, below a folder above the
@@ -27,37 +27,126 @@ pub(super) fn find(model: &Path, folders: &[PathBuf], file: &str) -> Option<Path
     candidates.into_iter().find(|c| c.is_file())
 }
 
+/// A file beside `path` whose name differs only in capitals, by name.
+pub(super) fn other_case(path: &Path) -> Option<String> {
+    let wanted = path.file_name()?.to_str()?;
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let entries = std::fs::read_dir(folder).ok()?;
+    let names = entries.filter_map(|e| e.ok()?.file_name().into_string().ok());
+    names.filter(|n| n.eq_ignore_ascii_case(wanted)).min()
+}
+
+/// What a mesh's file holds, as far as models need it.
+#[derive(Debug, Clone)]
+pub(super) struct Measured {
+    /// Lowest and highest corner of its vertices; `Err` says why there are none.
+    pub bounds: Result<[Point; 2], String>,
+    /// Why MuJoCo refuses it, in words behind its name.
+    pub refused: Option<String>,
+}
+
 /// Lowest and highest corner of an OBJ or STL file's vertices; `Err` says why there are none.
 pub(super) fn bounds(path: &Path) -> Result<[Point; 2], String> {
-    let bytes = xml::read_bytes(path, xml::MAX_BYTES).map_err(|e| e.to_string())?;
-    let kind = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-    let mut low = Vector::repeat(f64::INFINITY);
-    let mut high = Vector::repeat(f64::NEG_INFINITY);
-    let mut add = |p: [f64; 3]| {
-        low = low.inf(&Vector::from(p));
-        high = high.sup(&Vector::from(p));
+    measured(path).bounds
+}
+
+/// Vertices as they come.
+struct Vertices {
+    low: Vector,
+    high: Vector,
+    /// The first few that differ.
+    distinct: Vec<[f64; 3]>,
+}
+
+/// Fewer have no volume.
+const MIN_VERTICES: usize = 4;
+
+impl Vertices {
+    fn add(&mut self, p: [f64; 3]) {
+        // Comparisons would pass over what is no number.
+        if p.iter().all(|x| x.is_finite()) {
+            self.low = self.low.inf(&Vector::from(p));
+            self.high = self.high.sup(&Vector::from(p));
+        } else {
+            (self.low, self.high) = (Vector::repeat(f64::NEG_INFINITY), Vector::repeat(f64::INFINITY));
+        }
+        if self.distinct.len() < MIN_VERTICES && !self.distinct.contains(&p) {
+            self.distinct.push(p);
+        }
+    }
+
+    fn bounds(&self) -> Result<[Point; 2], String> {
+        if self.low.iter().chain(self.high.iter()).all(|x| x.is_finite()) {
+            Ok([Point::from(self.low), Point::from(self.high)])
+        } else {
+            Err("it has no vertices, or some that are not finite".to_owned())
+        }
+    }
+
+    /// Why there is no solid between them.
+    fn refused(&self) -> Option<String> {
+        if self.distinct.len() < MIN_VERTICES {
+            return Some(format!("has fewer than {MIN_VERTICES} vertices that differ"));
+        }
+        let extent = self.high - self.low;
+        if !extent.iter().all(|x| x.is_finite()) {
+            return Some("has vertices that are not finite".to_owned());
+        }
+        (extent.amin() <= 0.0).then(|| "is flat; give it a thickness, or write a thin box".to_owned())
+    }
+}
+
+/// Measures an OBJ or STL file.
+pub(super) fn measured(path: &Path) -> Measured {
+    let bytes = match xml::read_bytes(path, xml::MAX_BYTES) {
+        Ok(bytes) => bytes,
+        Err(e) => return Measured { bounds: Err(e.to_string()), refused: None },
     };
+    let pointer = "is a Git LFS pointer, not the mesh (run `git lfs pull`)";
+    if kinds::is_pointer(&bytes) {
+        return Measured { bounds: Err(format!("it {pointer}")), refused: Some(pointer.to_owned()) };
+    }
+    let kind = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let mut vertices =
+        Vertices { low: Vector::repeat(f64::INFINITY), high: Vector::repeat(f64::NEG_INFINITY), distinct: Vec::new() };
+    let mut refused = None;
     match kind.as_str() {
-        "obj" => text_vertices(&bytes, "v", &mut add),
+        "obj" => text_vertices(&bytes, "v", &mut |p: [f64; 3]| vertices.add(p)),
         "stl" => match binary_triangles(&bytes) {
             Some(triangles) => {
-                for corner in triangles.chunks_exact(TRIANGLE).flat_map(|t| t[12..48].chunks_exact(12)) {
-                    let coordinate = |k: usize| {
-                        let four = corner.get(4 * k..4 * k + 4).and_then(|b| b.try_into().ok()).unwrap_or([0; 4]);
-                        f64::from(f32::from_le_bytes(four))
-                    };
-                    add([coordinate(0), coordinate(1), coordinate(2)]);
+                corners(triangles, &mut |p: [f64; 3]| vertices.add(p));
+                let faces = triangles.len() / TRIANGLE;
+                if faces > MAX_FACES {
+                    refused = Some(format!("has {faces} faces, more than {MAX_FACES} in one STL"));
                 }
             }
-            None => text_vertices(&bytes, "vertex", &mut add),
+            None => {
+                text_vertices(&bytes, "vertex", &mut |p: [f64; 3]| vertices.add(p));
+                refused = Some("is no whole binary STL (text, cut off, or longer than it says)".to_owned());
+            }
         },
-        other => return Err(format!("the format \"{}\" is not read (OBJ and STL are)", xml::brief(other))),
+        other => {
+            let shown = if other.is_empty() { "no extension".to_owned() } else { format!(".{}", xml::brief(other)) };
+            // MuJoCo's own format is read by nobody else.
+            let refused = (other != "msh").then(|| format!("is not OBJ or binary STL ({shown})"));
+            let bounds = Err(format!("the format \"{}\" is not read (OBJ and STL are)", xml::brief(other)));
+            return Measured { bounds, refused };
+        }
     }
-    let finite = low.iter().chain(high.iter()).all(|x| x.is_finite());
-    if finite {
-        Ok([Point::from(low), Point::from(high)])
-    } else {
-        Err("it has no vertices, or some that are not finite".to_owned())
+    Measured { bounds: vertices.bounds(), refused: refused.or_else(|| vertices.refused()) }
+}
+
+/// What MuJoCo's reader of STL takes at most.
+const MAX_FACES: usize = 200_000;
+
+/// The corners of a binary STL's triangles.
+fn corners(triangles: &[u8], add: &mut impl FnMut([f64; 3])) {
+    for corner in triangles.chunks_exact(TRIANGLE).flat_map(|t| t[12..48].chunks_exact(12)) {
+        let coordinate = |k: usize| {
+            let four = corner.get(4 * k..4 * k + 4).and_then(|b| b.try_into().ok()).unwrap_or([0; 4]);
+            f64::from(f32::from_le_bytes(four))
+        };
+        add([coordinate(0), coordinate(1), coordinate(2)]);
     }
 }
 

@@ -8,6 +8,9 @@ pub mod check;
 mod contacts;
 pub mod furniture;
 pub mod glb;
+mod gltf_extensions;
+mod gltf_file;
+mod kinds;
 mod masses;
 mod mesh;
 pub mod mjcf;
@@ -18,12 +21,17 @@ mod mjcf_geoms;
 mod mjcf_refusals;
 mod mjcf_schema;
 mod mjcf_tree;
+mod parts;
 mod places;
+mod rigid_bodies;
 mod shapes;
 mod sweep;
 mod traps;
 pub mod urdf;
+mod urdf_geometry;
 mod xml;
+
+pub use kinds::is_gltf;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -44,6 +52,8 @@ pub enum Format {
         keeps_links: bool,
         /// Why `urdf-rs` does not read the file, where it does not.
         complaint: Option<String>,
+        /// What else simulators refuse or complain about, with their names.
+        faults: Vec<String>,
     },
     /// MJCF.
     Mjcf {
@@ -387,6 +397,9 @@ impl Model {
 /// # Errors
 /// Where it cannot be read, is neither of the two, or holds what no model can.
 pub fn read(path: &Path) -> Result<Model> {
+    if let Some(found) = kinds::foreign(path, &kinds::head(path)) {
+        return Err(Error::format(path, "file", format!("{found}; {}", kinds::WANTED)));
+    }
     let text = xml::read_text(path)?;
     let root = xml::parse(path, &text)?;
     if root.name == "mujoco" {
@@ -396,8 +409,7 @@ pub fn read(path: &Path) -> Result<Model> {
         return urdf::from_element(path, &text, &root);
     }
     let place = format!("line {}", root.line);
-    let message = format!("begins with <{}>; expected <robot> (URDF) or <mujoco> (MJCF)", xml::brief(&root.name));
-    Err(Error::format(path, place, message))
+    Err(Error::format(path, place, format!("{}; {}", kinds::foreign_root(&root.name), kinds::WANTED)))
 }
 
 /// Name of an XML file's first element.
@@ -504,7 +516,7 @@ mod tests {
         Model {
             name: "m".to_owned(),
             source: PathBuf::from("m.urdf"),
-            format: Format::Urdf { keeps_links: true, complaint: None },
+            format: Format::Urdf { keeps_links: true, complaint: None, faults: Vec::new() },
             links: ["a", "b", "c"].map(link).to_vec(),
             joints,
             excludes: Vec::new(),

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::check::Said;
+use super::check::{MAX_SLIDE_M, Said, plain};
 use super::glb::{Places, SHARES, Scene};
 use super::{Model, Tree};
+use crate::articulation::JointKind;
 use crate::math;
 use crate::twin::Twin;
 
@@ -13,12 +14,10 @@ const PLACE_M: f64 = 1e-5;
 
 /// Whether a scene's animations turn pivots, as far as the joints go.
 pub(super) fn animations(scene: &Scene, twin: Option<&Twin>) -> Said {
-    let mut said = Said::about(true);
-    if !scene.required.is_empty() {
-        said.fault(format!("needs extensions that many readers do not have: {}", scene.required.join(", ")));
-    }
+    let mut said = Said { concerned: true, faults: scene.faults.clone(), told: scene.told.clone(), ..Said::default() };
     if scene.moved.is_empty() && twin.is_none() {
-        said.tell("nothing in it is animated".to_owned());
+        let what = if scene.notes.is_empty() { "nothing in it is animated" } else { "nothing in it turns or slides" };
+        said.tell(what.to_owned());
     }
     for moved in &scene.moved {
         let name = &moved.name;
@@ -26,6 +25,16 @@ pub(super) fn animations(scene: &Scene, twin: Option<&Twin>) -> Said {
             said.fault(format!(
                 "{name}: is animated and carries nothing; animate a node at the hinge with the part below it"
             ));
+        }
+        match moved.kind {
+            JointKind::Prismatic if moved.reaches > MAX_SLIDE_M => {
+                said.fault(format!("{name}: its animation slides it by {} m; glTF is in metres", plain(moved.reaches)));
+            }
+            JointKind::Revolute if moved.reaches > std::f64::consts::TAU + 1e-6 => {
+                let degrees = moved.reaches.to_degrees();
+                said.fault(format!("{name}: its animation turns it by {degrees:.0}°, more than once around"));
+            }
+            _ => {}
         }
         if let Some(upper) = moved.upper
             && (moved.reaches - upper).abs() > 1e-3

@@ -2,16 +2,16 @@
 //! 0 and an absent inertia into no mass. Whether `urdf-rs` reads the file too is kept as [`Format::Urdf`]'s `complaint`.
 //!
 //! Read: links with inertia, boxes, cylinders, spheres, capsules and OBJ or STL meshes; joints with origin, axis, limit,
-//! dynamics. A `<limit>` with one of `lower` and `upper` has 0 for the other, as the format says. Listed as not read:
-//! `mimic`, `safety_controller`, `transmission`, `gazebo` and other additions.
+//! dynamics. A `<limit>` with one of `lower` and `upper` has 0 for the other, as the format says. What MuJoCo, PyBullet or
+//! others refuse though it can be read is kept as [`Format::Urdf`]'s `faults`. Listed as not read: `mimic`, `safety_controller`, `transmission`, `gazebo` and other additions.
 
 use std::path::Path;
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion};
 
-use super::shapes::Primitive;
+use super::urdf_geometry::{Compiler, Geometry};
 use super::xml::{self, Element};
-use super::{Format, Kind, Link, MassSource, Model, ModelJoint, Shape, bounded, mesh, named};
+use super::{Format, Kind, Link, MassSource, Model, ModelJoint, bounded, named};
 use crate::error::{Error, Result};
 use crate::math::{Point, Pose, Vector};
 
@@ -35,15 +35,16 @@ pub(super) fn from_element(path: &Path, text: &str, root: &Element) -> Result<Mo
             path.file_name().map_or_else(|| "FILE".to_owned(), |n| n.to_string_lossy().into_owned())
         )));
     }
-    let keeps_links = root
-        .all("mujoco")
-        .flat_map(|m| m.all("compiler"))
-        .any(|c| c.get("fusestatic") == Some("false") && c.get("discardvisual") == Some("false"));
-    let complaint = urdf_rs::read_from_string(text).err().map(|e| xml::brief(&e.to_string()));
+    let compiler = Compiler::of(root);
+    let keeps_links = compiler.keeps_links && compiler.keeps_visuals;
+    let fuses = !compiler.keeps_links;
+    let complaint = urdf_rs::read_from_string(text).err().map(|e| one_line(&e.to_string()));
+    let mut geometry = Geometry::new(path, compiler);
+    let mut mimics = Vec::new();
     let mut model = Model {
         name: named(root.get("name"), path),
         source: path.to_owned(),
-        format: Format::Urdf { keeps_links, complaint },
+        format: Format::Urdf { keeps_links, complaint, faults: Vec::new() },
         links: Vec::new(),
         joints: Vec::new(),
         excludes: Vec::new(),
@@ -54,14 +55,23 @@ pub(super) fn from_element(path: &Path, text: &str, root: &Element) -> Result<Mo
     for child in &root.children {
         match child.name.as_str() {
             "link" => {
-                let link = link(path, child, &mut model.notes)?;
+                let link = link(child, &mut geometry)?;
                 model.links.push(link);
             }
             "joint" => {
+                once(child, &JOINT_HAS_ONE, &mut geometry.faults);
                 let joint = joint(child, &mut model.notes)?;
+                if let Some(mimic) = child.child("mimic") {
+                    mimics.push((joint.name.clone(), mimic.get("joint").unwrap_or_default().to_owned()));
+                }
                 model.joints.push(joint);
             }
-            "material" | "mujoco" => {}
+            "material" => {
+                if let Some(file) = child.child("texture").and_then(|t| t.get("filename")) {
+                    geometry.texture(&child.label(), file);
+                }
+            }
+            "mujoco" => {}
             other => model.notes.push(format!("<{}> (line {}) is not read", xml::brief(other), child.line)),
         }
     }
@@ -69,7 +79,78 @@ pub(super) fn from_element(path: &Path, text: &str, root: &Element) -> Result<Mo
         return Err(Error::format(path, root.label(), "holds no <link>"));
     }
     bounded(&model)?;
+    geometry.finish();
+    let Geometry { faults: mut found, notes, .. } = geometry;
+    model.notes.extend(notes);
+    found.extend(mimicked(&model, &mimics));
+    found.extend(floating(&model, fuses));
+    if let Format::Urdf { faults, .. } = &mut model.format {
+        *faults = found;
+    }
     Ok(model)
+}
+
+/// A message as one line, whole unless it quotes half a file.
+fn one_line(text: &str) -> String {
+    const MOST: usize = 500;
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let line = words.join(" ");
+    if line.chars().count() <= MOST { line } else { format!("{}...", line.chars().take(MOST).collect::<String>()) }
+}
+
+/// What a joint has once.
+const JOINT_HAS_ONE: [&str; 7] = ["origin", "parent", "child", "axis", "limit", "dynamics", "mimic"];
+
+/// Tells of elements that are there more than once.
+fn once(element: &Element, names: &[&str], faults: &mut Vec<String>) {
+    for name in names {
+        if let Some(second) = element.all(name).nth(1) {
+            let (label, line) = (element.label(), second.line);
+            faults.push(format!(
+                "{label}: <{name}> is there twice (line {line}): MuJoCo refuses the file, others take the first or the last"
+            ));
+        }
+    }
+}
+
+/// Joints that follow themselves or nothing; pairs of names, the follower first.
+fn mimicked(model: &Model, mimics: &[(String, String)]) -> Vec<String> {
+    let moves = |name: &str| model.joints.iter().find(|j| j.name == name).map(|j| j.moves().is_some());
+    let tell = |(joint, of): &(String, String)| {
+        let shown = xml::brief(of);
+        if joint == of {
+            return Some(format!("{joint}: mimics itself: MuJoCo refuses the file"));
+        }
+        match moves(of) {
+            Some(true) => None,
+            Some(false) => {
+                Some(format!("{joint}: mimics {shown}, which does not move: MuJoCo ignores it with a warning"))
+            }
+            None => Some(format!("{joint}: mimics {shown}, which does not exist: MuJoCo ignores it with a warning")),
+        }
+    };
+    mimics.iter().filter_map(tell).collect()
+}
+
+/// Floating joints that hang on what is a body of its own to MuJoCo; `fuses` says that fixed links are none.
+fn floating(model: &Model, fuses: bool) -> Vec<String> {
+    let Ok(tree) = model.tree() else { return Vec::new() };
+    let Some(root) = tree.order.first().copied() else { return Vec::new() };
+    let in_world = |link: usize| {
+        let is_world = link == root && model.links[root].name == super::mjcf::WORLD;
+        is_world || (fuses && tree.body[link] == tree.body[root])
+    };
+    let hangs = |link: usize| {
+        let joint = &model.joints[tree.carrier[link]?];
+        let parent = tree.parent[link]?;
+        (joint.kind == Kind::Free && !in_world(parent)).then(|| {
+            format!(
+                "{}: floats on {}, which is not the world: MuJoCo refuses the file, PyBullet fixes it",
+                joint.name, joint.parent
+            )
+        })
+    };
+    (0..model.links.len()).filter_map(hangs).collect()
 }
 
 /// The first element that xacro has not replaced.
@@ -81,7 +162,8 @@ fn xacro(element: &Element) -> Option<&Element> {
     element.children.iter().find_map(xacro)
 }
 
-fn pose(parent: &Element) -> Result<Pose> {
+/// `parent_from_element`, from its `<origin>`.
+pub(super) fn pose(parent: &Element) -> Result<Pose> {
     let Some(origin) = parent.child("origin") else { return Ok(Pose::identity()) };
     let xyz = origin.numbers::<3>("xyz")?.unwrap_or_default();
     let turn = match (origin.numbers::<3>("rpy")?, origin.numbers::<4>("quat_xyzw")?) {
@@ -96,9 +178,11 @@ fn pose(parent: &Element) -> Result<Pose> {
     Ok(Pose::from_parts(Vector::from(xyz).into(), turn))
 }
 
-fn link(path: &Path, element: &Element, notes: &mut Vec<String>) -> Result<Link> {
+fn link(element: &Element, geometry: &mut Geometry) -> Result<Link> {
     let mut link = Link::named(element.own_name()?);
+    once(element, &["inertial"], &mut geometry.faults);
     if let Some(inertial) = element.child("inertial") {
+        once(inertial, &["origin", "mass", "inertia"], &mut geometry.faults);
         let place = pose(inertial)?;
         link.mass = inertial.child("mass").map(|m| m.number("value")).transpose()?.flatten();
         link.mass_source = MassSource::Stated;
@@ -117,59 +201,10 @@ fn link(path: &Path, element: &Element, notes: &mut Vec<String>) -> Result<Link>
             "collision" => false,
             _ => continue,
         };
-        let Some(geometry) = child.child("geometry") else { return Err(child.error("has no <geometry>")) };
-        let Some(solid) = geometry.children.first() else { return Err(geometry.error("is empty")) };
-        let primitive = if solid.name == "mesh" {
-            let file = solid.get("filename").ok_or_else(|| solid.error("has no filename"))?;
-            link.meshes.push(file.to_owned());
-            link.collides_as_mesh |= !visual;
-            let scale = Vector::from(solid.numbers::<3>("scale")?.unwrap_or([1.0; 3]));
-            match measured(path, file) {
-                Ok([low, high]) => {
-                    let ends = [low.coords.component_mul(&scale), high.coords.component_mul(&scale)];
-                    Primitive::Mesh([ends[0].inf(&ends[1]).into(), ends[0].sup(&ends[1]).into()])
-                }
-                Err(why) => {
-                    link.incomplete = true;
-                    notes.push(format!("{}: mesh {} is not read: {why}", link.name, xml::brief(file)));
-                    continue;
-                }
-            }
-        } else {
-            primitive(solid)?
-        };
-        link.shapes.push(Shape {
-            name: child.get("name").map(str::to_owned),
-            bounds: primitive.bounds(&pose(child)?),
-            exact: primitive.is_box(),
-            visual,
-            masks: [1, 1],
-        });
+        once(child, &["origin", "geometry", "material"], &mut geometry.faults);
+        geometry.add(&mut link, child, visual)?;
     }
     Ok(link)
-}
-
-fn measured(path: &Path, file: &str) -> std::result::Result<[Point; 2], String> {
-    mesh::bounds(&mesh::find(path, &[], file).ok_or("there is no such file beside the model")?)
-}
-
-fn primitive(solid: &Element) -> Result<Primitive> {
-    let positive = |name: &str| -> Result<f64> {
-        match solid.number(name)? {
-            Some(value) if value > 0.0 => Ok(value),
-            _ => Err(solid.error(format!("{name} must be there and positive"))),
-        }
-    };
-    Ok(match solid.name.as_str() {
-        "box" => match solid.numbers::<3>("size")? {
-            Some(size) if size.iter().all(|s| *s > 0.0) => Primitive::Cuboid(Vector::from(size) * 0.5),
-            _ => return Err(solid.error("size must be three positive numbers")),
-        },
-        "cylinder" => Primitive::Cylinder(positive("radius")?, 0.5 * positive("length")?),
-        "capsule" => Primitive::Capsule(positive("radius")?, 0.5 * positive("length")?),
-        "sphere" => Primitive::Sphere(positive("radius")?),
-        _ => return Err(solid.error("is no geometry of URDF (box, cylinder, sphere, capsule, mesh)")),
-    })
 }
 
 fn joint(element: &Element, notes: &mut Vec<String>) -> Result<ModelJoint> {
@@ -198,6 +233,10 @@ fn joint(element: &Element, notes: &mut Vec<String>) -> Result<ModelJoint> {
         (lower, upper) = (None, None);
     } else if lower.is_some() || upper.is_some() {
         (lower, upper) = (lower.or(Some(0.0)), upper.or(Some(0.0)));
+    }
+    if kind == Kind::Other {
+        let what = element.get("type").unwrap_or_default();
+        notes.push(format!("{name}: {what} joints are not judged: only hinges and slides are"));
     }
     for extra in ["mimic", "safety_controller"] {
         if element.child(extra).is_some() {
@@ -243,7 +282,7 @@ mod tests {
         let j = &m.joints[0];
         assert_eq!((j.lower, j.upper, j.effort, j.velocity, j.damping), (Some(0.0), Some(1.0), Some(3.0), None, None));
         assert_eq!((m.links[1].mass, m.links[1].shapes[0].bounds.half), (None, Vector::new(1.0, 2.0, 3.0)));
-        assert!(matches!(&m.format, Format::Urdf { keeps_links: false, complaint: Some(_) }));
+        assert!(matches!(&m.format, Format::Urdf { keeps_links: false, complaint: Some(_), .. }));
     }
 
     #[test]

@@ -12,6 +12,7 @@ mod formats;
 mod honesty;
 mod known_truth;
 mod mjcf;
+mod models;
 mod physics;
 mod real_recordings;
 mod robust;
