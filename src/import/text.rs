@@ -125,12 +125,27 @@ fn start(text: &str) -> String {
     text.trim().chars().take(40).collect()
 }
 
-/// Cells of a line: separated by commas (or semicolons), or by white space where there are none.
+/// Cells of a line: separated by commas (or semicolons), or by white space where there are none. Commas within double quotes
+/// separate nothing; quotes about a cell stay.
 #[must_use]
 pub fn cells(line: &str) -> Vec<&str> {
-    match [',', ';'].into_iter().find(|c| line.contains(*c)) {
-        Some(separator) => line.split(separator).map(str::trim).collect(),
-        None => line.split_whitespace().collect(),
+    let Some(separator) = [',', ';'].into_iter().find(|c| line.contains(*c)) else {
+        return line.split_whitespace().collect();
+    };
+    let mut is_quoted = false;
+    line.split(|c: char| {
+        is_quoted ^= c == '"';
+        c == separator && !is_quoted
+    })
+    .map(str::trim)
+    .collect()
+}
+
+/// A cell without the quotes about it; two quotes within are one.
+fn unquoted(cell: &str) -> String {
+    match cell.strip_prefix('"').and_then(|c| c.strip_suffix('"')) {
+        Some(inner) => inner.replace("\"\"", "\""),
+        None => cell.to_owned(),
     }
 }
 
@@ -157,7 +172,7 @@ impl Table {
         let Some(first) = lines.content()? else {
             return Err(Error::format(path, "line 1", "the file is empty; expected a header line"));
         };
-        let header: Vec<String> = cells(&first).iter().map(|c| c.trim_matches('"').to_ascii_lowercase()).collect();
+        let header: Vec<String> = cells(&first).into_iter().map(|c| unquoted(c).to_ascii_lowercase()).collect();
         // Of two columns with one name the first counts.
         let columns = header.iter().enumerate().rev().map(|(i, name)| (name.clone(), i)).collect();
         Ok(Self { lines, columns, header })
@@ -189,7 +204,7 @@ impl Table {
     /// Where a row has another number of cells than the header.
     pub fn row(&mut self) -> Result<Option<Row<'_>>> {
         let Some(line) = self.lines.content()? else { return Ok(None) };
-        let cells: Vec<String> = cells(&line).into_iter().map(|c| c.trim_matches('"').to_owned()).collect();
+        let cells: Vec<String> = cells(&line).into_iter().map(unquoted).collect();
         if cells.len() != self.header.len() {
             let (found, expected) = (cells.len(), self.header.len());
             return Err(self.lines.fault(format!(
@@ -261,6 +276,14 @@ mod tests {
         let row = table.row().unwrap().unwrap();
         assert_eq!((row.number("b").unwrap(), row.whole("a").unwrap()), (2.5, 7));
         assert!(table.row().unwrap().is_none());
+    }
+
+    #[test]
+    fn a_quoted_comma_separates_nothing() {
+        let (_dir, path) = written("a,b\n\"open \"\"the\"\" door, slowly\",2\n");
+        let mut table = Table::open(&path).unwrap();
+        let row = table.row().unwrap().unwrap();
+        assert_eq!((row.text("a"), row.whole("b").unwrap()), ("open \"the\" door, slowly", 2));
     }
 
     #[test]

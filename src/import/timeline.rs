@@ -106,13 +106,18 @@ fn base_frames(captures: &[Capture]) -> Option<(usize, Vec<At>)> {
 /// # Errors
 /// Where there are no poses, no intrinsics, or no frame has a pose.
 pub(super) fn build(captures: &[Capture], options: &Options, report: &mut Report) -> Result<Timeline> {
-    let nothing = |what: &str| Error::Config(format!("import: {what}"));
     let Some((base, mut ats)) = base_frames(captures) else {
-        return Err(nothing("no source has images, depth or poses; nothing can be placed in time"));
+        let path = captures.first().map(|c| c.source.clone()).unwrap_or_default();
+        let message = "no source has images, depth or poses; nothing can be placed in time".to_owned();
+        return Err(Error::Format { path, place: "streams".to_owned(), message });
     };
     let Some(posed) = first(captures, |c| c.poses.as_ref().is_some_and(|p| !p.items.is_empty())) else {
-        let (_, _, command) = super::report::NEEDED[1];
-        return Err(nothing(&format!("no source has camera poses; find them, for example: {command}")));
+        let [_, (_, _, command), ..] = super::report::NEEDED;
+        return Err(Error::format(
+            &captures[base].source,
+            "poses",
+            format!("no source has camera poses; find them, for example: {command}"),
+        ));
     };
     let has_times = times(&mut ats, options, report);
     let gap_secs =

@@ -63,7 +63,7 @@ struct HandsFrame {
 struct HandEntry {
     side: Side,
     #[serde(default)]
-    contact: bool,
+    contact: Option<bool>,
     joints_world: Vec<[f64; 3]>,
 }
 
@@ -274,7 +274,7 @@ fn check_clips(clips: &[Clip], frames: usize, faults: &mut Faults) {
 fn hands(dir: &Path, frames: usize, faults: &mut Faults) -> Result<Vec<HandSample>> {
     let full = dir.join("hands.json");
     let tips = dir.join("fingertips.csv");
-    let mut samples = if full.is_file() {
+    let (mut samples, unsaid) = if full.is_file() {
         hands_json(&full, faults)?
     } else if tips.is_file() {
         fingertips_csv(&tips)?
@@ -297,12 +297,31 @@ fn hands(dir: &Path, frames: usize, faults: &mut Faults) -> Result<Vec<HandSampl
         inside && finite
     });
     samples.sort_by_key(|s| (s.frame, s.side));
+    check_contact(&samples, unsaid, faults);
     Ok(samples)
 }
 
-fn hands_json(path: &Path, faults: &mut Faults) -> Result<Vec<HandSample>> {
+/// Hands of which none is in contact leave nothing to infer from; a file that says of none has another way out than a detector
+/// that says no.
+fn check_contact(samples: &[HandSample], unsaid: usize, faults: &mut Faults) {
+    if samples.is_empty() || samples.iter().any(|s| s.contact) {
+        return;
+    }
+    let told = if unsaid > 0 { format!(" (of {unsaid} the file does not say)") } else { String::new() };
+    faults.add(
+        "contact",
+        format!(
+            "hands: no sample is in contact{told}; run a contact detector and fill \"contact\"; true in every sample means \
+             that nobody knows, and goes with hands.use_contact = false in the config"
+        ),
+    );
+}
+
+/// The samples, and of how many of them the file does not say whether they are in contact.
+fn hands_json(path: &Path, faults: &mut Faults) -> Result<(Vec<HandSample>, usize)> {
     let file: HandsFile = json::read(path)?;
     let mut samples = Vec::new();
+    let mut unsaid = 0;
     for frame in file.frames {
         for hand in frame.hands {
             let Some(tips) = TIP_JOINTS.iter().map(|&j| hand.joints_world.get(j)).collect::<Option<Vec<_>>>() else {
@@ -311,10 +330,12 @@ fn hands_json(path: &Path, faults: &mut Faults) -> Result<Vec<HandSample>> {
                 continue;
             };
             let tips = [0, 1, 2].map(|i| Point::from(*tips[i]));
-            samples.push(HandSample { frame: frame.frame, side: hand.side, contact: hand.contact, tips });
+            unsaid += usize::from(hand.contact.is_none());
+            let contact = hand.contact.unwrap_or(false);
+            samples.push(HandSample { frame: frame.frame, side: hand.side, contact, tips });
         }
     }
-    Ok(samples)
+    Ok((samples, unsaid))
 }
 
 /// Reads a line of at most [`MAX_LINE_BYTES`]; `None` at the end of the file.
@@ -332,7 +353,8 @@ pub(super) fn bounded_line(reader: &mut impl BufRead, path: &Path, number: usize
     Ok(Some(text.trim_end_matches(['\n', '\r']).to_owned()))
 }
 
-fn fingertips_csv(path: &Path) -> Result<Vec<HandSample>> {
+/// The samples, and of how many of them the file does not say whether they are in contact: their cell is empty.
+fn fingertips_csv(path: &Path) -> Result<(Vec<HandSample>, usize)> {
     const TIPS: [[&str; 3]; 3] =
         [["thumb_x", "thumb_y", "thumb_z"], ["index_x", "index_y", "index_z"], ["middle_x", "middle_y", "middle_z"]];
     let file = File::open(path).map_err(|e| Error::io(path, &e))?;
@@ -353,6 +375,7 @@ fn fingertips_csv(path: &Path) -> Result<Vec<HandSample>> {
         }
     }
     let mut samples = Vec::new();
+    let mut unsaid = 0;
     let mut number = 1;
     loop {
         number += 1;
@@ -385,10 +408,11 @@ fn fingertips_csv(path: &Path) -> Result<Vec<HandSample>> {
         for (tip, columns) in tips.iter_mut().zip(tip_columns) {
             *tip = Point::new(number_at(columns[0])?, number_at(columns[1])?, number_at(columns[2])?);
         }
+        unsaid += usize::from(cells[contact].is_empty());
         let contact = matches!(cells[contact], "1" | "true" | "True");
         samples.push(HandSample { frame: index, side, contact, tips });
     }
-    Ok(samples)
+    Ok((samples, unsaid))
 }
 
 /// A hand's own size tells the unit of the file, whatever the scene is like.
@@ -419,14 +443,6 @@ fn check_hands(hands: &[HandSample], frames: &[Frame], faults: &mut Faults) {
                 "hands are {distance:.2} from the camera (median), an arm reaches 0.2 to 1.2 m; hands and camera poses \
                  must share one world frame and one unit (metres)"
             ),
-        );
-    }
-    if !hands.iter().any(|s| s.contact) {
-        faults.add(
-            "contact",
-            "hands: no sample is in contact; run a contact detector and fill \"contact\"; true in every sample means that \
-             nobody knows, and goes with hands.use_contact = false in the config"
-                .to_owned(),
         );
     }
 }

@@ -9,6 +9,7 @@ mod common;
 mod floors;
 mod foreign;
 mod formats;
+mod import;
 mod known_truth;
 mod physics;
 mod real_recordings;
