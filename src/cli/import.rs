@@ -299,9 +299,10 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("track.txt");
         std::fs::write(&path, "0 0 0 0 0 0 0 1\n").unwrap();
-        let kinds =
-            |sources: &[PathBuf]| -> Vec<&str> { resolve(sources).unwrap().iter().map(|(f, _)| f.name).collect() };
-        assert_eq!(kinds(&[path.clone()]), ["tum"]);
+        let kinds = |sources: &[PathBuf]| -> Vec<&'static str> {
+            resolve(sources).unwrap().iter().map(|(f, _)| f.name).collect()
+        };
+        assert_eq!(kinds(std::slice::from_ref(&path)), ["tum"]);
         assert_eq!(kinds(&["frames".into(), path.clone()]), ["frames"]);
         let pair = PathBuf::from(format!("stray={}", path.display()));
         assert_eq!(kinds(&[path.clone(), pair]), ["tum", "stray"]);

@@ -26,7 +26,7 @@ pub mod text;
 pub mod video;
 pub mod warp;
 
-mod assemble;
+mod assembly;
 mod imported;
 mod people;
 mod timeline;
@@ -34,7 +34,7 @@ mod world;
 
 use std::path::PathBuf;
 
-pub use assemble::assemble;
+pub use assembly::assemble;
 pub use capture::Capture;
 pub use imported::{Frame, Hand, Imported, Written};
 
