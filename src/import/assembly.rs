@@ -2,9 +2,9 @@
 
 use super::axes::Convention;
 use super::imported::{Frame, Imported};
-use super::optics::View;
 use super::report::{NEEDED, Report, SourceReport};
 use super::timeline::{self, Timeline};
+use super::view::View;
 use super::{Capture, Options, people, world};
 use crate::error::{Error, Result};
 use crate::math::{Point, Pose, Vector};

@@ -21,9 +21,11 @@ pub mod formats;
 pub mod join;
 pub mod joints;
 pub mod optics;
+pub mod poses;
 pub mod report;
 pub mod text;
 pub mod video;
+pub mod view;
 pub mod warp;
 
 mod assembly;

@@ -4,7 +4,8 @@ use image::RgbImage;
 
 use super::capture::{Layer, Normals};
 use super::decode;
-use super::optics::{Optics, View};
+use super::optics::Optics;
+use super::view::View;
 use crate::error::Result;
 use crate::math::{Point, Pose, Vector, unit};
 use crate::recording::Grid;

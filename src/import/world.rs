@@ -47,11 +47,11 @@ fn depth_of(
     captures: &[Capture],
     frame: &Draft,
     options: &Options,
-) -> Result<Option<(crate::recording::Grid<f32>, super::optics::View)>> {
+) -> Result<Option<(crate::recording::Grid<f32>, super::view::View)>> {
     let Some(item) = frame.depth else { return Ok(None) };
     let Some(depth) = captures.get(item.capture).and_then(|c| c.depth.as_ref()) else { return Ok(None) };
     let Some(at) = depth.items.get(item.item) else { return Ok(None) };
-    let view = super::optics::View::of(&frame.optics, &Options { width: 160, ..options.clone() });
+    let view = super::view::View::of(&frame.optics, &Options { width: 160, ..options.clone() });
     let grid = decode::depth(&at.blob, None, depth)?;
     let camera = super::imported::depth_camera(depth, at, &frame.optics, &grid);
     let is_ray = depth.along == super::capture::Along::Ray;
