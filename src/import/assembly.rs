@@ -30,6 +30,16 @@ pub fn assemble(captures: Vec<Capture>, options: &Options) -> Result<Imported> {
     people::contacts(&captures, &timeline, &mut hands, &mut report);
     let clips = people::clips(&captures, &timeline, &mut report);
     let points = points(&captures, &timeline, &place, options);
+    let depth_factor = world::depth_factor(&captures, &timeline, &place, options);
+    match depth_factor {
+        None => report
+            .dropped
+            .push("depth, whose unit is not metres and that no points of a reconstruction scale".to_owned()),
+        Some(factor) if factor != 1.0 => {
+            report.changes.push(format!("depth is multiplied by {factor:.5} to be metres"))
+        }
+        Some(_) => {}
+    }
     told_changes(&timeline, &view, options, &mut report);
     let frames = timeline
         .frames
@@ -43,7 +53,7 @@ pub fn assemble(captures: Vec<Capture>, options: &Options) -> Result<Imported> {
                 source_pose: f.world_from_camera,
                 optics: f.optics,
                 image: f.image,
-                depth: f.depth,
+                depth: f.depth.filter(|_| depth_factor.is_some()),
                 mask: f.mask,
                 normals: f.normals,
                 segments: f.segments,
@@ -65,6 +75,7 @@ pub fn assemble(captures: Vec<Capture>, options: &Options) -> Result<Imported> {
         points,
         report,
         captures,
+        depth_factor: depth_factor.unwrap_or(1.0),
         pictures,
         extracted: std::collections::BTreeMap::new(),
         options: options.clone(),

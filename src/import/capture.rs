@@ -1,7 +1,7 @@
 //! What one source gives: timed streams as plain data, in the source's own words.
 //!
 //! A reader fills a [`Capture`] and converts nothing that is declared here: axes, units, directions and joint orders are told,
-//! and `axes`, `joints`, `depth` and `picture` act on what is told. So an option can overrule a declaration.
+//! and `axes`, `joints`, `decode` and `warp` act on what is told. So an option can overrule a declaration.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -43,6 +43,12 @@ impl At {
     pub fn name(file: &str) -> Self {
         let stem = Path::new(file).file_stem().map(|s| s.to_string_lossy().into_owned());
         Self { name: stem, ..Self::default() }
+    }
+
+    /// The same so many seconds later.
+    #[must_use]
+    pub fn later(&self, secs: f64) -> Self {
+        Self { time_secs: self.time_secs.map(|t| t + secs), ..self.clone() }
     }
 
     /// The same with a frame of the video, from 0.
@@ -168,7 +174,7 @@ pub struct Depth {
     pub coding: DepthCoding,
     /// What a value measures.
     pub along: Along,
-    /// Whether the unit is metres. No for relative depth, which is scaled by the points of the capture with poses.
+    /// Whether the unit is metres. No for depth up to one factor, which the points of the capture with the poses then tell.
     pub is_metric: bool,
     /// The depth camera; `None`: the colour camera, its intrinsics scaled to the depth's size.
     pub optics: Option<Optics>,

@@ -18,7 +18,7 @@ use super::timeline::Item;
 use super::view::View;
 use super::warp::DepthCamera;
 use super::{Options, decode, video, warp};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::math::{Point, Pose};
 use crate::recording::{Clip, Grid, Side};
 
@@ -88,6 +88,7 @@ pub struct Imported {
     pub report: Report,
     /// The sources.
     pub captures: Vec<Capture>,
+    pub(super) depth_factor: f64,
     pub(super) pictures: Vec<(PathBuf, bool, usize)>,
     pub(super) extracted: BTreeMap<(PathBuf, usize), PathBuf>,
     pub(super) options: Options,
@@ -276,10 +277,16 @@ impl Imported {
                 None => return Ok(None),
             },
         };
+        // A picture of a video lies in a folder of no name: the video is what a user knows.
+        let named = |error: Error| match &source.picture {
+            Picture::Still(_) => error,
+            Picture::Video { file, index, .. } => {
+                Error::format(file, format!("picture {index}"), "what ffmpeg made of it cannot be read")
+            }
+        };
         let name = format!("frames/{frame:06}.jpg");
-        let is_same = self.view.is_same(&f.optics);
-        if is_same {
-            let bytes = blob.read()?;
+        if self.view.is_same(&f.optics) {
+            let bytes = blob.read().map_err(named)?;
             let is_jpeg = bytes.starts_with(&[0xFF, 0xD8, 0xFF]);
             let size = image::ImageReader::new(std::io::Cursor::new(&bytes))
                 .with_guessed_format()
@@ -289,14 +296,19 @@ impl Imported {
                 return Ok(Some((name, bytes)));
             }
         }
-        let image = decode::picture(&blob)?.into_rgb8();
+        let image = decode::picture(&blob).map_err(named)?.into_rgb8();
         let (width, height) = (image.width() as usize, image.height() as usize);
         if !f.optics.has_shape(width, height) {
-            return Err(blob.fault(format!(
+            let file = match &source.picture {
+                Picture::Still(blob) => blob.file(),
+                Picture::Video { file, .. } => file.as_path(),
+            };
+            let message = format!(
                 "is {width} x {height}, its camera {} x {}: another shape; a rotated or cropped image needs its own \
                  intrinsics (--camera)",
                 f.optics.width, f.optics.height
-            )));
+            );
+            return Err(Error::format(file, "size", message));
         }
         let data = warp::color(&image, &self.view, &f.optics);
         let camera = &self.view.camera;
@@ -318,9 +330,10 @@ impl Imported {
         let camera = depth_camera(depth, at, &f.optics, &grid);
         let pose = self.color_from_depth(capture, depth, at, f);
         let out = warp::depth(&grid, depth.along == Along::Ray, camera, pose.as_ref(), &self.view);
+        let to_mm = 1000.0 * self.depth_factor;
         // What 16 bits of millimetres cannot hold is no value.
         let counts =
-            out.data.iter().map(|z| f64::from(*z) * 1000.0).map(|mm| if mm < 65_535.5 { mm.round() as u16 } else { 0 });
+            out.data.iter().map(|z| f64::from(*z) * to_mm).map(|mm| if mm < 65_535.5 { mm.round() as u16 } else { 0 });
         let bytes: Vec<u8> = counts.flat_map(u16::to_ne_bytes).collect();
         Ok(Some((format!("depth/{frame:06}.png"), self.png(&bytes, ExtendedColorType::L16)?)))
     }

@@ -85,7 +85,7 @@ pub(super) fn hands(
     let has = |c: &Capture| c.hands.as_ref().is_some_and(|h| !h.items.is_empty());
     let Some(index) = captures.iter().position(has) else { return Vec::new() };
     let Some(source) = captures.get(index).and_then(|c| c.hands.as_ref()) else { return Vec::new() };
-    let ats: Vec<At> = source.items.iter().map(|h| lagged(&h.at, options.hand_lag_secs)).collect();
+    let ats: Vec<At> = source.items.iter().map(|h| h.at.later(options.hand_lag_secs)).collect();
     let frames: Vec<At> = timeline.frames.iter().map(|f| f.at.clone()).collect();
     let is_one_clock = timeline.is_one_clock(captures, index);
     let joined = join(&frames, ats.iter(), is_one_clock, timeline.gap_secs);
@@ -121,10 +121,6 @@ pub(super) fn hands(
         joined_by: joined.by.words().to_owned(),
     });
     out
-}
-
-fn lagged(at: &At, lag_secs: f64) -> At {
-    At { time_secs: at.time_secs.map(|t| t + lag_secs), ..at.clone() }
 }
 
 fn bridge<'a>(

@@ -42,6 +42,8 @@ pub(super) struct Draft {
     pub normals: Option<Item>,
     /// Segments.
     pub segments: Option<Item>,
+    /// Whether a hand belongs to it.
+    pub has_hand: bool,
 }
 
 /// The frames, and what they were joined with.
@@ -152,6 +154,7 @@ pub(super) fn build(captures: &[Capture], options: &Options, report: &mut Report
         mask: join_stream("masks", &|c| c.masks.iter().flat_map(|d| &d.items).map(|x| x.at.clone()).collect()),
         normals: join_stream("normals", &|c| c.normals.iter().flat_map(|d| &d.items).map(|x| x.at.clone()).collect()),
         segments: join_stream("segments", &|c| c.segments.iter().map(|x| x.at.clone()).collect()),
+        has_hand: with_hands(captures, &ats, &one, gap_secs, options),
     };
 
     let frames = drafts(captures, base, ats, poses, &items, options)?;
@@ -166,6 +169,28 @@ pub(super) fn build(captures: &[Capture], options: &Options, report: &mut Report
     Ok(Timeline { frames, base, posed, track, gap_secs, has_times })
 }
 
+/// Whether each frame has a hand. What they are is found once the frames are chosen.
+fn with_hands(
+    captures: &[Capture],
+    ats: &[At],
+    is_one_clock: &dyn Fn(usize) -> bool,
+    gap_secs: f64,
+    options: &Options,
+) -> Vec<bool> {
+    let mut out = vec![false; ats.len()];
+    let hands = |c: &Capture| -> Vec<At> {
+        c.hands.iter().flat_map(|h| &h.items).map(|h| h.at.later(options.hand_lag_secs)).collect()
+    };
+    let Some(i) = first(captures, |c| !hands(c).is_empty()) else { return out };
+    let of = hands(&captures[i]);
+    for frame in join(ats, of.iter(), is_one_clock(i), gap_secs).frame_of.into_iter().flatten() {
+        if let Some(has) = out.get_mut(frame) {
+            *has = true;
+        }
+    }
+    out
+}
+
 /// Items of each frame, one list a stream.
 struct Items {
     image: Vec<Option<Item>>,
@@ -173,6 +198,7 @@ struct Items {
     mask: Vec<Option<Item>>,
     normals: Vec<Option<Item>>,
     segments: Vec<Option<Item>>,
+    has_hand: Vec<bool>,
 }
 
 /// Gives every frame a time. Whether they are the source's own.
@@ -291,6 +317,7 @@ fn drafts(
             mask: get(&items.mask),
             normals: get(&items.normals),
             segments: get(&items.segments),
+            has_hand: items.has_hand.get(i).copied().unwrap_or(false),
         });
     }
     frames.sort_by(|a, b| a.time_secs.total_cmp(&b.time_secs));
@@ -305,7 +332,10 @@ fn thinned(frames: Vec<Draft>, fps: f64) -> Vec<Draft> {
         return frames;
     }
     let slot = |f: &Draft| ((f.time_secs - first) * fps).round();
-    let shows = |f: &Draft| [&f.image, &f.depth, &f.mask, &f.normals].iter().filter(|s| s.is_some()).count();
+    let shows = |f: &Draft| {
+        let seen = [&f.image, &f.depth, &f.mask, &f.normals].iter().filter(|s| s.is_some()).count();
+        seen + usize::from(f.has_hand)
+    };
     let off = |f: &Draft| ((f.time_secs - first) * fps - slot(f)).abs();
     let mut out: Vec<Draft> = Vec::new();
     for frame in frames {

@@ -51,8 +51,9 @@ fn run(program: &Path, command: &mut Command, file: &Path) -> Result<Vec<u8>> {
     })?;
     if !out.status.success() {
         let said = String::from_utf8_lossy(&out.stderr);
-        let last = said.lines().map(str::trim).rfind(|l| !l.is_empty()).unwrap_or("no reason given");
-        return Err(Error::format(file, "video", format!("{} could not read it: {last}", program.display())));
+        // The first line names the cause, the others what failed because of it.
+        let first = said.lines().map(str::trim).find(|l| !l.is_empty()).unwrap_or("no reason given");
+        return Err(Error::format(file, "video", format!("{} could not read it: {first}", program.display())));
     }
     Ok(out.stdout)
 }
@@ -124,25 +125,23 @@ pub fn extract(
         return Err(Error::format(file, "video", message));
     }
     let ffmpeg = program(ffmpeg, "ffmpeg");
-    let mut command = Command::new(&ffmpeg);
-    command.args(["-nostdin", "-v", "error", "-y"]);
-    if !is_upright {
-        command.arg("-noautorotate");
-    }
-    command.arg("-i").arg(argument(file));
-    // Every picture once, by its own number; 2 is JPEG's finest quality here.
-    command.args([
-        "-map",
-        "0:v:0",
-        "-vf",
-        format!("select={select}").as_str(),
-        "-fps_mode",
-        "passthrough",
-        "-q:v",
-        "2",
-    ]);
-    command.arg(folder.join("%06d.jpg"));
-    run(&ffmpeg, &mut command, file)?;
+    let decode = |each_once: &str| {
+        let mut command = Command::new(&ffmpeg);
+        command.args(["-nostdin", "-v", "error", "-y"]);
+        if !is_upright {
+            command.arg("-noautorotate");
+        }
+        command.arg("-i").arg(argument(file));
+        command.args(["-map", "0:v:0", "-vf"]).arg(format!("select={select}"));
+        // 2 is JPEG's finest quality here.
+        command.args([each_once, "passthrough", "-q:v", "2"]).arg(folder.join("%06d.jpg"));
+        run(&ffmpeg, &mut command, file)
+    };
+    // Every picture once, by its own number: the option has another name before ffmpeg 5.1.
+    match decode("-fps_mode") {
+        Err(error) if error.to_string().contains("fps_mode") => decode("-vsync")?,
+        other => other?,
+    };
     let paths = (1..=frames.len()).map(|i| folder.join(format!("{i:06}.jpg")));
     Ok(paths.take_while(|p| p.is_file()).collect())
 }

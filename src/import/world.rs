@@ -104,7 +104,7 @@ pub(super) fn place(
 /// world.
 fn found_scale(captures: &[Capture], timeline: &Timeline, convention: &Convention, options: &Options) -> Result<Scale> {
     let capture = &captures[timeline.posed];
-    let ratios = depth_ratios(captures, timeline, convention, options);
+    let ratios = depth_ratios(captures, timeline, convention, options, true);
     if let (Some(median), true) = (stats::median(&ratios), ratios.len() >= 3) {
         let off: Vec<f64> = ratios.iter().map(|r| (r / median - 1.0).abs()).collect();
         // 1.48 times the median deviation is a normal distribution's standard deviation.
@@ -132,17 +132,36 @@ fn found_scale(captures: &[Capture], timeline: &Timeline, convention: &Conventio
     })
 }
 
-/// Of each frame that was looked at: metric depth over the depth of the points there, the median.
-fn depth_ratios(captures: &[Capture], timeline: &Timeline, convention: &Convention, options: &Options) -> Vec<f64> {
+/// What depth up to one factor is multiplied by to be metres, from the points of the reconstruction; 1 where depth is metric,
+/// `None` where nothing tells it.
+pub(super) fn depth_factor(captures: &[Capture], timeline: &Timeline, place: &Place, options: &Options) -> Option<f64> {
+    let source = timeline.frames.iter().find_map(|f| f.depth).and_then(|d| captures.get(d.capture)?.depth.as_ref());
+    if source.is_none_or(|d| d.is_metric) {
+        return Some(1.0);
+    }
+    let convention = Convention::of(captures.get(timeline.posed)?, options);
+    let ratios = depth_ratios(captures, timeline, &convention, options, false);
+    Some(place.scale / stats::median(&ratios)?)
+}
+
+/// Of each frame that was looked at: depth (metric or not) over the depth of the points there, the median.
+fn depth_ratios(
+    captures: &[Capture],
+    timeline: &Timeline,
+    convention: &Convention,
+    options: &Options,
+    metric: bool,
+) -> Vec<f64> {
     /// Points of a frame that a ratio needs.
     const LEAST: usize = 20;
     let capture = &captures[timeline.posed];
     let points: Vec<Point> = capture.points.iter().map(|p| convention.point(p)).collect();
-    let is_metric = |f: &&Draft| {
-        f.depth.and_then(|d| captures.get(d.capture)).and_then(|c| c.depth.as_ref()).is_some_and(|d| d.is_metric)
+    let is_meant = |f: &&Draft| {
+        let depth = f.depth.and_then(|d| captures.get(d.capture)).and_then(|c| c.depth.as_ref());
+        depth.is_some_and(|d| d.is_metric == metric)
     };
     let mut ratios = Vec::new();
-    for frame in some(&timeline.frames).filter(is_metric) {
+    for frame in some(&timeline.frames).filter(is_meant) {
         // A frame whose depth cannot be read is told when it is written.
         let Ok(Some((depth, view))) = depth_of(captures, frame, options) else { continue };
         let output_from_world =

@@ -70,6 +70,9 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
         ));
     }
     let mut notes = vec![format!("LiDAR depth of confidence {LEAST_CONFIDENCE} and more; the app records no hands")];
+    if video.is_some() {
+        notes.push("rows of odometry.csv are taken for the video's pictures one by one, from 0".to_owned());
+    }
     if lost > 0 {
         notes.push(format!("{lost} rows of odometry.csv have no depth image"));
     }
