@@ -282,7 +282,7 @@ fn pose_all(
     Ok((out, track))
 }
 
-/// Frames with a pose, in time order, each time once.
+/// Frames with a pose, in time order.
 fn drafts(
     captures: &[Capture],
     base: usize,
@@ -321,7 +321,6 @@ fn drafts(
         });
     }
     frames.sort_by(|a, b| a.time_secs.total_cmp(&b.time_secs));
-    frames.dedup_by(|b, a| a.time_secs == b.time_secs);
     Ok(frames)
 }
 

@@ -1,6 +1,6 @@
 //! The world of the result: metres and +Z up, from what the source says, from the user, or from the recording itself.
 
-use nalgebra::UnitQuaternion;
+use nalgebra::{Matrix3, UnitQuaternion};
 
 use super::axes::{Convention, upright};
 use super::capture::{Capture, JointFrame};
@@ -10,7 +10,7 @@ use super::timeline::{Draft, Timeline};
 use super::{Options, decode, warp};
 use crate::error::{Error, Result};
 use crate::math::directions::mean_shift;
-use crate::math::{Point, Pose, Vector, signed_angle, stats, unit};
+use crate::math::{Point, Pose, Vector, eigen_descending, signed_angle, stats, unit};
 use crate::recording::Camera;
 
 /// Frames whose depth is looked at for scale and gravity: enough for a median, few enough to take seconds.
@@ -18,7 +18,7 @@ const LOOKED_AT: usize = 16;
 /// Length of a palm from the wrist to the middle knuckle, metres: the mean of grown people, and its spread as a share.
 const PALM_M: f64 = 0.09;
 const PALM_SPREAD: f64 = 0.1;
-/// How far the mean of the cameras' up may be from gravity: heads bend down to what hands do, about the level axis too.
+/// How far what the cameras tell may be from gravity: heads bend down to what hands do.
 const CAMERA_UP_STD_DEG: f64 = 15.0;
 /// The same once a dominant level surface near it was found.
 const ROOM_UP_STD_DEG: f64 = 2.0;
@@ -196,17 +196,40 @@ fn palms(capture: &Capture) -> Vec<f64> {
         .collect()
 }
 
-/// Up, from the cameras' mean up and the dominant surface that is level by it.
-fn found_up(captures: &[Capture], timeline: &Timeline, options: &Options) -> Up {
-    let sum: Vector = timeline.frames.iter().map(|f| f.world_from_camera.rotation * -camera_down(options)).sum();
+/// Up as the cameras tell it. Heads hardly roll, so that their right is level wherever they look; they bend down, so that
+/// their mean up leans, and counts only where they look one way.
+fn cameras_up(frames: &[Draft], options: &Options) -> Vector {
+    /// Weight of the mean up beside all rights together: as much as a head that turns by 15 degrees.
+    const LEAN_WEIGHT: f64 = 0.05;
+    let along = |f: &Draft, axis: Vector| f.world_from_camera.rotation * (source_from_output(options) * axis);
+    let sum: Vector = frames.iter().map(|f| along(f, -Vector::y())).sum();
     let mean = unit(&sum).unwrap_or_else(Vector::z);
+    let mut level = (Matrix3::identity() - mean * mean.transpose()) * LEAN_WEIGHT;
+    for frame in frames {
+        let right = along(frame, Vector::x());
+        level += right * right.transpose() / frames.len() as f64;
+    }
+    let (axes, _) = eigen_descending(level);
+    let up = axes.column(2).into_owned();
+    if up.dot(&mean) < 0.0 { -up } else { up }
+}
+
+/// How images are turned against the source's.
+fn source_from_output(options: &Options) -> UnitQuaternion<f64> {
+    let angle = -std::f64::consts::FRAC_PI_2 * f64::from(options.rotate_quarters % 4);
+    UnitQuaternion::from_scaled_axis(Vector::z() * angle)
+}
+
+/// Up, from the cameras and the dominant surface that is level by them.
+fn found_up(captures: &[Capture], timeline: &Timeline, options: &Options) -> Up {
+    let mean = cameras_up(&timeline.frames, options);
     let mut normals: Vec<Vector> = Vec::new();
     for frame in some(&timeline.frames) {
         let Ok(Some((depth, view))) = depth_of(captures, frame, options) else { continue };
         let turn = frame.world_from_camera.rotation * view.source_from_output;
         normals.extend(slopes(&depth, &view.camera).into_iter().map(|n| turn * n));
     }
-    // Level surfaces show their normal within 40 degrees of a head's mean up; walls stand across it.
+    // Level surfaces show their normal near that; walls stand across it.
     let level: Vec<(Vector, f64)> = normals
         .iter()
         .map(|n| if n.dot(&mean) < 0.0 { -*n } else { *n })
@@ -222,21 +245,15 @@ fn found_up(captures: &[Capture], timeline: &Timeline, options: &Options) -> Up 
             Up {
                 direction: axis.into(),
                 std_deg: ROOM_UP_STD_DEG,
-                from: "the dominant level surface near the cameras' mean up".to_owned(),
+                from: "the dominant level surface as cameras that hardly roll see it".to_owned(),
             }
         }
         _ => Up {
             direction: mean.into(),
             std_deg: CAMERA_UP_STD_DEG,
-            from: "the cameras' mean up; give --up AXIS where you know it".to_owned(),
+            from: "cameras that hardly roll; give --up AXIS where you know it".to_owned(),
         },
     }
-}
-
-/// Where down is in the source's camera, its images turned as asked.
-fn camera_down(options: &Options) -> Vector {
-    let angle = -std::f64::consts::FRAC_PI_2 * f64::from(options.rotate_quarters % 4);
-    UnitQuaternion::from_scaled_axis(Vector::z() * angle) * Vector::y()
 }
 
 /// Normals of the surface at every fourth pixel, facing the camera; none at edges.
