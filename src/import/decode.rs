@@ -1,7 +1,8 @@
 //! Bytes to pixels: images, and depth in all its codings.
 
-use image::{DynamicImage, ImageReader};
 use std::io::Cursor;
+
+use image::{DynamicImage, ImageReader};
 
 use super::blob::Blob;
 use super::capture::{ByteOrder, Depth, DepthCoding};
