@@ -35,6 +35,9 @@ pub mod error;
 pub mod json;
 pub mod math;
 pub mod recording;
+
+pub mod import;
+
 pub mod twin;
 pub mod vlm;
 

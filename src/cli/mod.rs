@@ -9,6 +9,7 @@ mod demo;
 mod evaluate;
 mod export;
 mod foreign;
+mod import;
 mod infer;
 mod keep;
 mod measure;
@@ -55,6 +56,8 @@ struct Cli {
 enum Command {
     /// Render a recording of a kitchen, make its twin and say where to look
     Demo(demo::DemoArgs),
+    /// Make a recording of what a device, a data set or a network wrote
+    Import(Box<import::ImportArgs>),
     /// Make a simulated, validated twin from a recording
     Twin(twin::TwinArgs),
     /// Infer joints from recordings, or from a bare trajectory
@@ -126,6 +129,7 @@ pub fn run() -> ExitCode {
     let cli = Cli::parse();
     let result = match cli.command {
         Command::Demo(args) => demo::run(&args),
+        Command::Import(args) => import::run(&args),
         Command::Twin(args) => twin::run(&args),
         Command::Infer(args) => infer::run(&args),
         Command::Export(args) => export::run(&args),

@@ -419,6 +419,7 @@ fn fingertips_csv(path: &Path) -> Result<Hands> {
         }
     }
     let mut samples = Vec::new();
+    let mut contact_known = false;
     let mut number = 1;
     loop {
         number += 1;
@@ -451,7 +452,9 @@ fn fingertips_csv(path: &Path) -> Result<Hands> {
         for (tip, columns) in tips.iter_mut().zip(tip_columns) {
             *tip = Point::new(number_at(columns[0])?, number_at(columns[1])?, number_at(columns[2])?);
         }
-        let contact = match contact.map(|column| cells[column]) {
+        let said = contact.map(|column| cells[column]).filter(|cell| !cell.is_empty());
+        contact_known |= said.is_some();
+        let contact = match said {
             Some("1" | "true" | "True") => true,
             None | Some("0" | "false" | "False") => false,
             Some(other) => {
@@ -460,7 +463,7 @@ fn fingertips_csv(path: &Path) -> Result<Hands> {
         };
         samples.push(HandSample { frame: index, side, contact, tips });
     }
-    Ok(Hands { samples, contact_known: contact.is_some() })
+    Ok(Hands { samples, contact_known })
 }
 
 /// A hand's own size tells the unit of the file, whatever the scene is like.

@@ -8,7 +8,7 @@ const FLOORS: [&[&str]; 17] = [
     &["json", "math"],
     &["articulation", "vlm"],
     &["recording", "config"],
-    &["twin"],
+    &["twin", "import"],
     &["model"],
     &["hands", "synth"],
     &["localization"],

@@ -1,0 +1,151 @@
+//! Captures to one recording.
+
+use super::axes::Convention;
+use super::imported::{Frame, Imported};
+use super::report::{NEEDED, Report, SourceReport};
+use super::timeline::{self, Timeline};
+use super::view::View;
+use super::{Capture, Options, people, world};
+use crate::error::{Error, Result};
+use crate::math::{Point, Pose, Vector};
+use crate::recording::HAND_CLASS;
+
+/// Points of a reconstruction that are kept: those of a large house at 2 cm.
+const MAX_POINTS: usize = 2_000_000;
+
+/// Joins captures to one recording: frames of the first capture with images (else depth, else poses), poses of the first one
+/// with poses, and so on for every stream.
+///
+/// # Errors
+/// Where nothing can be placed: no poses, no intrinsics, no frame with a pose, a scale that nothing tells.
+pub fn assemble(captures: Vec<Capture>, options: &Options) -> Result<Imported> {
+    let mut report = Report { sources: captures.iter().map(SourceReport::of).collect(), ..Report::default() };
+    let timeline = timeline::build(&captures, options, &mut report)?;
+    let place = world::place(&captures, &timeline, options, &mut report)?;
+    let Some(first) = timeline.frames.first() else {
+        return Err(Error::Config("import: no frame is left".to_owned()));
+    };
+    let view = View::of(&first.optics, options);
+    let mut hands = people::hands(&captures, &timeline, &place, options, &mut report);
+    people::contacts(&captures, &timeline, &mut hands, &mut report);
+    let clips = people::clips(&captures, &timeline, &mut report);
+    let points = points(&captures, &timeline, &place, options);
+    let depth_factor = world::depth_factor(&captures, &timeline, &place, options);
+    match depth_factor {
+        None => report
+            .dropped
+            .push("depth, whose unit is not metres and that no points of a reconstruction scale".to_owned()),
+        Some(factor) if factor != 1.0 => {
+            report.changes.push(format!("depth is multiplied by {factor:.5} to be metres"))
+        }
+        Some(_) => {}
+    }
+    told_changes(&timeline, &view, options, &mut report);
+    let frames = timeline
+        .frames
+        .iter()
+        .map(|f| {
+            let turned = Pose::from_parts(Vector::zeros().into(), view.source_from_output);
+            Frame {
+                at: f.at.clone(),
+                time_secs: f.time_secs,
+                world_from_camera: place.pose(&f.world_from_camera) * turned,
+                source_pose: f.world_from_camera,
+                optics: f.optics,
+                image: f.image,
+                depth: f.depth.filter(|_| depth_factor.is_some()),
+                mask: f.mask,
+                normals: f.normals,
+                segments: f.segments,
+            }
+        })
+        .collect();
+    let mut labels =
+        captures.iter().filter_map(|c| c.masks.as_ref()).find(|m| !m.items.is_empty()).map(|m| m.labels.clone());
+    if let Some(labels) = &mut labels {
+        labels.entry(HAND_CLASS).or_insert_with(|| "hand".to_owned());
+    }
+    let pictures = timeline::video_pictures(&captures, &timeline.frames);
+    let mut imported = Imported {
+        view,
+        frames,
+        clips,
+        hands,
+        labels: labels.unwrap_or_default(),
+        points,
+        report,
+        captures,
+        depth_factor: depth_factor.unwrap_or(1.0),
+        pictures,
+        extracted: std::collections::BTreeMap::new(),
+        options: options.clone(),
+    };
+    imported.report.missing = missing(&imported);
+    imported.report.findings = super::checks::findings(&imported);
+    Ok(imported)
+}
+
+/// Points of the capture with the poses, evenly thinned.
+fn points(captures: &[Capture], timeline: &Timeline, place: &world::Place, options: &Options) -> Vec<Point> {
+    let Some(capture) = captures.get(timeline.posed) else { return Vec::new() };
+    let convention = Convention::of(capture, options);
+    let step = capture.points.len().div_ceil(MAX_POINTS).max(1);
+    capture
+        .points
+        .iter()
+        .step_by(step)
+        .map(|p| place.point(&convention.point(p)))
+        .filter(|p| p.iter().all(|x| x.is_finite()))
+        .collect()
+}
+
+/// What was done to every image.
+fn told_changes(timeline: &Timeline, view: &View, options: &Options, report: &mut Report) {
+    let Some(first) = timeline.frames.first() else { return };
+    let c = &view.camera;
+    if !view.is_same(&first.optics) {
+        report.changes.push(format!(
+            "images of {} x {} (lens {}) become pinhole images of {} x {}",
+            first.optics.width,
+            first.optics.height,
+            match first.optics.lens {
+                super::optics::Lens::Pinhole => "pinhole",
+                super::optics::Lens::OpenCv { .. } => "OpenCV",
+                super::optics::Lens::Fisheye { .. } => "fisheye",
+                super::optics::Lens::FisheyeRadTanThinPrism { .. } => "FisheyeRadTanThinPrism",
+            },
+            c.width,
+            c.height
+        ));
+    }
+    if options.rotate_quarters % 4 != 0 {
+        report
+            .changes
+            .push(format!("images are turned clockwise by {} degrees", 90 * u32::from(options.rotate_quarters % 4)));
+    }
+    if options.hand_lag_secs != 0.0 {
+        report.changes.push(format!("{} s are added to the hands' times", options.hand_lag_secs));
+    }
+}
+
+/// Streams that no source has, with the way to fill them: the source's own word where it has one.
+fn missing(imported: &Imported) -> Vec<super::capture::Missing> {
+    let lacks = |what: &str| match what {
+        "images" => imported.frames.iter().all(|f| f.image.is_none()),
+        "depth" => imported.frames.iter().all(|f| f.depth.is_none()) && imported.points.is_empty(),
+        "hands" => imported.hands.is_empty(),
+        "contact" => !imported.hands.is_empty() && imported.hands.iter().all(|h| h.contact.is_none()),
+        "clips" => imported.clips.is_empty(),
+        _ => false,
+    };
+    let mut out: Vec<super::capture::Missing> = Vec::new();
+    for (what, why, command) in NEEDED.iter().filter(|(what, _, _)| lacks(what)) {
+        let own = imported.captures.iter().flat_map(|c| &c.missing).find(|m| m.what == *what);
+        out.push(own.cloned().unwrap_or_else(|| super::capture::Missing {
+            what: (*what).to_owned(),
+            why: (*why).to_owned(),
+            command: (*command).to_owned(),
+        }));
+    }
+    out
+}

@@ -1,0 +1,291 @@
+//! Bytes to pixels: images, and depth in all its codings.
+
+use std::io::Cursor;
+
+use image::{DynamicImage, ImageReader};
+
+use super::blob::Blob;
+use super::capture::{ByteOrder, Depth, DepthCoding};
+use crate::error::{Error, Result};
+use crate::recording::Grid;
+
+/// A decoder may claim any size; a 4K RGB image needs 25 MB.
+const MAX_DECODED_BYTES: u64 = 512 << 20;
+/// More pixels than any camera here has.
+const MAX_PIXELS: usize = 64 << 20;
+
+/// An image, its format told by its content.
+///
+/// # Errors
+/// Where the bytes cannot be read or are no image.
+pub fn picture(blob: &Blob) -> Result<DynamicImage> {
+    let bytes = blob.read()?;
+    let mut reader = ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|e| blob.fault(format!("cannot be read ({e})")))?;
+    let mut limits = image::Limits::default();
+    limits.max_alloc = Some(MAX_DECODED_BYTES);
+    reader.limits(limits);
+    reader.decode().map_err(|e| blob.fault(format!("is no image that can be decoded ({e}); JPEG and PNG can")))
+}
+
+/// Values of 8 bits of a grey image, or one byte a pixel of a raw array of a known size.
+///
+/// # Errors
+/// Where the bytes are neither.
+pub fn bytes_grid(blob: &Blob, width: usize, height: usize) -> Result<Grid<u8>> {
+    let bytes = blob.read()?;
+    if bytes.len() == width * height {
+        return Ok(Grid { width, height, data: bytes });
+    }
+    grey(blob)
+}
+
+/// A grey image of 8 bits.
+///
+/// # Errors
+/// Where the bytes are another kind of image.
+pub fn grey(blob: &Blob) -> Result<Grid<u8>> {
+    match picture(blob)? {
+        DynamicImage::ImageLuma8(image) => {
+            let (width, height) = (image.width() as usize, image.height() as usize);
+            Ok(Grid { width, height, data: image.into_raw() })
+        }
+        other => Err(blob.fault(format!("must be an 8-bit grey image, this is {:?}", other.color()))),
+    }
+}
+
+/// Depth as it is stored, metres where it is metric; 0 where there is no value or too little confidence.
+///
+/// # Errors
+/// Where the bytes do not hold what the coding says.
+pub fn depth(blob: &Blob, confidence: Option<&Blob>, how: &Depth) -> Result<Grid<f32>> {
+    let mut grid = match how.coding {
+        DepthCoding::Png16 { unit_m } => png(blob, unit_m)?,
+        DepthCoding::Pgm16 { unit_m } => pgm(blob, unit_m)?,
+        DepthCoding::Exr => open_exr(blob)?,
+        DepthCoding::Npy { unit_m } => npy(blob, unit_m)?,
+        DepthCoding::RawF32 { width, height, order } => {
+            raw(blob, width, height, |[a, b, c, d]: [u8; 4]| match order {
+                ByteOrder::Little => f32::from_le_bytes([a, b, c, d]),
+                ByteOrder::Big => f32::from_be_bytes([a, b, c, d]),
+            })?
+        }
+        DepthCoding::RawU16 { width, height, order, unit_m } => raw(blob, width, height, |[a, b]: [u8; 2]| {
+            let count = match order {
+                ByteOrder::Little => u16::from_le_bytes([a, b]),
+                ByteOrder::Big => u16::from_be_bytes([a, b]),
+            };
+            (f64::from(count) * unit_m) as f32
+        })?,
+    };
+    for z in &mut grid.data {
+        if !z.is_finite() || *z < 0.0 {
+            *z = 0.0;
+        }
+    }
+    if let Some(confidence) = confidence
+        && how.least_confidence > 0
+    {
+        let sure = bytes_grid(confidence, grid.width, grid.height)?;
+        if (sure.width, sure.height) != (grid.width, grid.height) {
+            return Err(confidence
+                .fault(format!("is {} x {}, its depth is {} x {}", sure.width, sure.height, grid.width, grid.height)));
+        }
+        for (z, c) in grid.data.iter_mut().zip(&sure.data) {
+            if *c < how.least_confidence {
+                *z = 0.0;
+            }
+        }
+    }
+    Ok(grid)
+}
+
+fn png(blob: &Blob, unit_m: f64) -> Result<Grid<f32>> {
+    let scaled = |count: u32| (f64::from(count) * unit_m) as f32;
+    match picture(blob)? {
+        DynamicImage::ImageLuma16(image) => Ok(Grid {
+            width: image.width() as usize,
+            height: image.height() as usize,
+            data: image.into_raw().into_iter().map(|c| scaled(u32::from(c))).collect(),
+        }),
+        DynamicImage::ImageLuma8(image) => Ok(Grid {
+            width: image.width() as usize,
+            height: image.height() as usize,
+            data: image.into_raw().into_iter().map(|c| scaled(u32::from(c))).collect(),
+        }),
+        other => Err(blob.fault(format!(
+            "depth must be a grey image, this is {:?}; a coloured picture of depth holds no metres",
+            other.color()
+        ))),
+    }
+}
+
+/// Rows of numbers of `N` bytes each.
+fn raw<const N: usize>(blob: &Blob, width: usize, height: usize, value: impl Fn([u8; N]) -> f32) -> Result<Grid<f32>> {
+    let bytes = blob.read()?;
+    let pixels = width.checked_mul(height).filter(|n| (1..=MAX_PIXELS).contains(n));
+    match pixels {
+        Some(pixels) if bytes.len() == pixels * N => Ok(Grid {
+            width,
+            height,
+            data: bytes.chunks_exact(N).filter_map(|c| c.try_into().ok()).map(value).collect(),
+        }),
+        _ => {
+            Err(blob.fault(format!("has {} bytes; {width} x {height} pixels of {N} bytes were expected", bytes.len())))
+        }
+    }
+}
+
+/// A binary portable grey map (`P5`); comments may stand in its header.
+fn pgm(blob: &Blob, unit_m: f64) -> Result<Grid<f32>> {
+    let bytes = blob.read()?;
+    let mut at = 0;
+    let mut words = Vec::new();
+    while words.len() < 4 {
+        while bytes.get(at).is_some_and(u8::is_ascii_whitespace) {
+            at += 1;
+        }
+        if bytes.get(at) == Some(&b'#') {
+            while bytes.get(at).is_some_and(|b| *b != b'\n') {
+                at += 1;
+            }
+            continue;
+        }
+        let start = at;
+        while bytes.get(at).is_some_and(|b| !b.is_ascii_whitespace()) {
+            at += 1;
+        }
+        let word = bytes.get(start..at).filter(|w| !w.is_empty());
+        words.push(word.map(|w| String::from_utf8_lossy(w).into_owned()).unwrap_or_default());
+    }
+    let number = |i: usize| words.get(i).and_then(|w| w.parse::<usize>().ok());
+    let (Some(width), Some(height), Some(most)) = (number(1), number(2), number(3)) else {
+        return Err(blob.fault("is no PGM: expected \"P5 width height maximum\""));
+    };
+    let wide = usize::from(most > 255) + 1;
+    let body = bytes.get(at + 1..).unwrap_or_default();
+    let pixels = width.checked_mul(height).filter(|n| (1..=MAX_PIXELS).contains(n));
+    if words.first().map(String::as_str) != Some("P5") || pixels.is_none_or(|n| body.len() < n * wide) {
+        return Err(blob.fault(format!("is no whole binary PGM of {width} x {height} pixels of {wide} bytes")));
+    }
+    let data = body
+        .chunks_exact(wide)
+        .take(width * height)
+        .map(|c| c.iter().fold(0u32, |sum, b| (sum << 8) | u32::from(*b)))
+        .map(|count| (f64::from(count) * unit_m) as f32)
+        .collect();
+    Ok(Grid { width, height, data })
+}
+
+fn npy(blob: &Blob, unit_m: f64) -> Result<Grid<f32>> {
+    let bytes = blob.read()?;
+    let array = npyz::NpyFile::new(bytes.as_slice()).map_err(|e| blob.fault(format!("is no numpy array ({e})")))?;
+    let shape: Vec<u64> = array.shape().iter().copied().filter(|n| *n != 1).collect();
+    let [height, width] = shape.as_slice() else {
+        return Err(blob.fault(format!("has shape {:?}, expected (rows, columns)", array.shape())));
+    };
+    let (width, height) = (*width as usize, *height as usize);
+    if width.checked_mul(height).is_none_or(|n| n > MAX_PIXELS) || array.order() != npyz::Order::C {
+        return Err(blob.fault("is too large or in Fortran order; save numpy.ascontiguousarray(depth)"));
+    }
+    let unread = |e: std::io::Error| blob.fault(format!("cannot be read ({e}); save it as float32 or uint16"));
+    let scaled = |v: f64| (v * unit_m) as f32;
+    let data: Vec<f32> = match array.dtype().descr().trim_matches('\'') {
+        "<f4" | ">f4" => array.into_vec::<f32>().map_err(unread)?.into_iter().map(|v| scaled(f64::from(v))).collect(),
+        "<u2" | ">u2" => array.into_vec::<u16>().map_err(unread)?.into_iter().map(|v| scaled(f64::from(v))).collect(),
+        "<f8" | ">f8" => array.into_vec::<f64>().map_err(unread)?.into_iter().map(scaled).collect(),
+        other => return Err(blob.fault(format!("has numbers of type {other}; save it as float32 or uint16"))),
+    };
+    Ok(Grid { width, height, data })
+}
+
+/// The channel Y or Z, else the first one, of an OpenEXR image's first layer.
+fn open_exr(blob: &Blob) -> Result<Grid<f32>> {
+    use exr::prelude::{MetaData, ReadChannels, ReadLayers};
+    let bytes = blob.read()?;
+    let broken = |e: exr::error::Error| blob.fault(format!("is no OpenEXR image that can be read ({e})"));
+    // The header's word is checked before anything of its size is made.
+    let meta = MetaData::read_from_buffered(Cursor::new(&bytes), false).map_err(broken)?;
+    let pixels = meta
+        .headers
+        .iter()
+        .map(|h| h.layer_size.0.saturating_mul(h.layer_size.1).saturating_mul(h.channels.list.len()))
+        .fold(0, usize::saturating_add);
+    if meta.headers.iter().any(|h| h.deep) {
+        return Err(blob.fault("holds several samples a pixel (deep data); write it flat"));
+    }
+    if pixels > MAX_PIXELS {
+        return Err(blob.fault(format!("claims {pixels} numbers; depth has one channel")));
+    }
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .non_parallel()
+        .from_buffered(Cursor::new(&bytes))
+        .map_err(broken)?;
+    let channels = &image.layer_data.channel_data.list;
+    let named = |name: &str| channels.iter().find(|c| c.name == *name);
+    let Some(channel) = named("Y").or_else(|| named("Z")).or_else(|| channels.first()) else {
+        return Err(blob.fault("has no channel"));
+    };
+    let (width, height) = (image.layer_data.size.0, image.layer_data.size.1);
+    let data: Vec<f32> = channel.sample_data.values_as_f32().collect();
+    if data.len() != width * height {
+        return Err(blob.fault("has a channel of another size than the image"));
+    }
+    Ok(Grid { width, height, data })
+}
+
+/// A mistake of ours, should an encoder ever refuse.
+pub(super) fn encoding(e: &image::ImageError) -> Error {
+    Error::Export(format!("an image cannot be encoded: {e}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn how(coding: DepthCoding) -> Depth {
+        Depth {
+            coding,
+            along: super::super::capture::Along::Z,
+            is_metric: true,
+            optics: None,
+            color_from_depth: None,
+            rays: None,
+            least_confidence: 2,
+            items: Vec::new(),
+        }
+    }
+
+    fn inline(bytes: &[u8]) -> Blob {
+        Blob::Inline(bytes.into())
+    }
+
+    #[test]
+    fn raw_depth_has_its_order_and_no_bad_values() {
+        let floats: Vec<u8> = [1.5f32, f32::NAN, -1.0, f32::INFINITY].iter().flat_map(|v| v.to_be_bytes()).collect();
+        let coding = DepthCoding::RawF32 { width: 2, height: 2, order: ByteOrder::Big };
+        assert_eq!(depth(&inline(&floats), None, &how(coding.clone())).unwrap().data, [1.5, 0.0, 0.0, 0.0]);
+        let error = depth(&inline(&floats[..15]), None, &how(coding)).unwrap_err().to_string();
+        assert!(error.contains("15 bytes"), "{error}");
+        let coding = DepthCoding::RawU16 { width: 2, height: 1, order: ByteOrder::Little, unit_m: 0.001 };
+        let sure = inline(&[2, 1]);
+        assert_eq!(depth(&inline(&[0xE8, 3, 1, 0]), Some(&sure), &how(coding)).unwrap().data, [1.0, 0.0]);
+    }
+
+    #[test]
+    fn grey_maps_have_comments_and_two_bytes() {
+        let mut bytes = b"P5\n# hololens\n2 1\n65535\n".to_vec();
+        bytes.extend([0x03, 0xE8, 0, 0]);
+        let coding = DepthCoding::Pgm16 { unit_m: 0.001 };
+        assert_eq!(depth(&inline(&bytes), None, &how(coding.clone())).unwrap().data, [1.0, 0.0]);
+        for broken in [&bytes[..bytes.len() - 1], b"P5", b"", b"P2\n2 1\n255\n11"] {
+            assert!(depth(&inline(broken), None, &how(coding.clone())).is_err());
+        }
+    }
+}

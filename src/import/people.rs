@@ -1,0 +1,247 @@
+//! Hands, contact and narrations of the result.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Matrix3;
+
+use super::Options;
+use super::axes::{Convention, camera_matrix};
+use super::capture::{At, Capture, Hands, JointFrame};
+use super::imported::Hand;
+use super::join::{By, Track, join};
+use super::report::{Report, Stream, source_name};
+use super::timeline::{Draft, Timeline};
+use super::world::Place;
+use crate::math::{Point, Pose};
+use crate::recording::{Clip, Side};
+
+/// From joints of a file to the result's world.
+struct Bridge<'a> {
+    frame: JointFrame,
+    unit_m: f64,
+    /// Of the capture with the hands.
+    own: Convention,
+    /// Poses of the capture with the hands, where its world is not that of the poses.
+    own_track: Option<Track>,
+    body_from_camera: Option<Pose>,
+    track: &'a Track,
+    place: &'a Place,
+    pose_gap_secs: f64,
+    is_one_clock: bool,
+}
+
+impl Bridge<'_> {
+    /// A hand's joints in the result's world; `None` where it cannot be placed.
+    fn joints(
+        &self,
+        joints: &[Option<[f64; 3]>; 21],
+        time_secs: Option<f64>,
+        frame: &Draft,
+    ) -> Option<[Option<Point>; 21]> {
+        // The camera when the hand was seen, which may be a little before or after the frame.
+        let time = time_secs.filter(|_| self.is_one_clock);
+        let world_from_camera =
+            time.and_then(|t| self.track.at(t, self.pose_gap_secs)).unwrap_or(frame.world_from_camera);
+        let camera_from_joints = match self.frame {
+            JointFrame::World => None,
+            JointFrame::Camera(axes) => Some((camera_matrix(axes), Pose::identity())),
+            JointFrame::Body => {
+                Some((Matrix3::identity(), self.body_from_camera.map_or_else(Pose::identity, |b| b.inverse())))
+            }
+        };
+        // Joints of another world go through the camera that both worlds know.
+        let other = match &self.own_track {
+            None => None,
+            Some(track) => Some(track.at(time_secs?, self.pose_gap_secs)?.inverse()),
+        };
+        Some(joints.map(|p| {
+            let p = Point::from(p?);
+            let in_world = match (&camera_from_joints, &other) {
+                (Some((turn, pose)), _) => world_from_camera * (pose * Point::from(turn * p.coords * self.unit_m)),
+                (None, None) => self.own.point(&p),
+                (None, Some(camera_from_own)) => world_from_camera * (camera_from_own * self.own.point(&p)),
+            };
+            let placed = match (&camera_from_joints, &other) {
+                (None, None) => self.place.point(&in_world),
+                // Metric offsets from a camera of arbitrary scale: only the camera's place is scaled.
+                _ => {
+                    let placed = self.place.pose(&world_from_camera);
+                    placed * (world_from_camera.inverse() * in_world)
+                }
+            };
+            Some(placed)
+        }))
+    }
+}
+
+/// Hands at the frames, at most one a side and frame.
+pub(super) fn hands(
+    captures: &[Capture],
+    timeline: &Timeline,
+    place: &Place,
+    options: &Options,
+    report: &mut Report,
+) -> Vec<Hand> {
+    let has = |c: &Capture| c.hands.as_ref().is_some_and(|h| !h.items.is_empty());
+    let Some(index) = captures.iter().position(has) else { return Vec::new() };
+    let Some(source) = captures.get(index).and_then(|c| c.hands.as_ref()) else { return Vec::new() };
+    let ats: Vec<At> = source.items.iter().map(|h| h.at.later(options.hand_lag_secs)).collect();
+    let frames: Vec<At> = timeline.frames.iter().map(|f| f.at.clone()).collect();
+    let is_one_clock = timeline.is_one_clock(captures, index);
+    let joined = join(&frames, ats.iter(), is_one_clock, timeline.gap_secs);
+    let bridge = bridge(captures, index, source, timeline, place, options, report);
+    let mut best: BTreeMap<(usize, Side), (f64, Hand)> = BTreeMap::new();
+    let mut lost = 0;
+    for ((item, at), frame) in source.items.iter().zip(&ats).zip(&joined.frame_of) {
+        let Some((number, frame)) = frame.and_then(|f| Some((f, timeline.frames.get(f)?))) else { continue };
+        let Some(joints) = bridge.joints(&source.order.to_mano(&item.joints), at.time_secs, frame) else {
+            lost += 1;
+            continue;
+        };
+        let distance = match (joined.by, at.time_secs) {
+            (By::Time | By::Overlap, Some(t)) => (t - frame.time_secs).abs(),
+            // Of several hands of one side the one that the detector is surest of.
+            _ => 1.0 - item.score.unwrap_or(0.0),
+        };
+        let hand = Hand { frame: number, side: item.side, joints, contact: item.contact, score: item.score };
+        let key = (number, item.side);
+        if best.get(&key).is_none_or(|(old, _)| distance < *old) {
+            best.insert(key, (distance, hand));
+        }
+    }
+    let out: Vec<Hand> = best.into_values().map(|(_, hand)| hand).collect();
+    if lost > 0 {
+        report.dropped.push(format!("{lost} hands at times without a camera pose"));
+    }
+    report.streams.push(Stream {
+        stream: "hands".to_owned(),
+        count: out.len(),
+        of: source.items.len(),
+        source: source_name(&captures[index]),
+        joined_by: joined.by.words().to_owned(),
+    });
+    out
+}
+
+fn bridge<'a>(
+    captures: &[Capture],
+    index: usize,
+    hands: &Hands,
+    timeline: &'a Timeline,
+    place: &'a Place,
+    options: &Options,
+    report: &mut Report,
+) -> Bridge<'a> {
+    let capture = &captures[index];
+    let is_same = index == timeline.posed;
+    // Options are about the source with the poses.
+    let plain = Options::default();
+    let own = Convention::of(capture, if is_same { options } else { &plain });
+    let own_track =
+        capture.poses.as_ref().filter(|p| !is_same && hands.frame == JointFrame::World && !p.items.is_empty());
+    let own_track = own_track.map(|poses| {
+        Track::of(poses.items.iter().filter_map(|p| Some((p.at.time_secs?, own.world_from_camera(&p.pose)?))).collect())
+    });
+    if !is_same && hands.frame == JointFrame::World && own_track.is_none() {
+        report.changes.push(format!(
+            "hands of {} are taken to be in the world of {}",
+            source_name(capture),
+            source_name(&captures[timeline.posed])
+        ));
+    }
+    let body = captures[timeline.posed].poses.as_ref().and_then(|p| p.body_from_camera);
+    Bridge {
+        frame: hands.frame,
+        unit_m: hands.unit_m,
+        own,
+        own_track,
+        body_from_camera: capture.poses.as_ref().and_then(|p| p.body_from_camera).or(body),
+        track: &timeline.track,
+        place,
+        pose_gap_secs: options.pose_gap_secs,
+        is_one_clock: timeline.is_one_clock(captures, index) && timeline.is_one_clock(captures, timeline.posed),
+    }
+}
+
+/// Opinions about contact that come without joints, written onto the hands of the same frame and side.
+pub(super) fn contacts(captures: &[Capture], timeline: &Timeline, hands: &mut [Hand], report: &mut Report) {
+    let Some(index) = captures.iter().position(|c| !c.contacts.is_empty()) else { return };
+    let capture = &captures[index];
+    let frames: Vec<At> = timeline.frames.iter().map(|f| f.at.clone()).collect();
+    let one_clock = timeline.is_one_clock(captures, index);
+    let joined = join(&frames, capture.contacts.iter().map(|c| &c.at), one_clock, timeline.gap_secs);
+    let mut said: BTreeMap<(usize, Side), bool> = BTreeMap::new();
+    for (contact, frame) in capture.contacts.iter().zip(&joined.frame_of) {
+        if let Some(frame) = frame {
+            *said.entry((*frame, contact.side)).or_default() |= contact.contact;
+        }
+    }
+    let mut count = 0;
+    // A frame that the detector saw without this hand says nothing.
+    for hand in hands.iter_mut() {
+        if let Some(contact) = said.get(&(hand.frame, hand.side)) {
+            hand.contact = Some(*contact);
+            count += 1;
+        }
+    }
+    report.streams.push(Stream {
+        stream: "contact".to_owned(),
+        count,
+        of: capture.contacts.len(),
+        source: source_name(capture),
+        joined_by: joined.by.words().to_owned(),
+    });
+}
+
+/// Narrations by frame numbers of the result. Names are made unique; a clip that holds no frame is left out.
+pub(super) fn clips(captures: &[Capture], timeline: &Timeline, report: &mut Report) -> Vec<Clip> {
+    let Some(index) = captures.iter().position(|c| !c.clips.is_empty()) else { return Vec::new() };
+    let source = &captures[index];
+    let mut out: Vec<Clip> = Vec::new();
+    let mut by = By::Nothing;
+    for (i, clip) in source.clips.iter().enumerate() {
+        let Some((start, end, how)) = span(timeline, &clip.start, &clip.end) else { continue };
+        by = how;
+        let name = if clip.name.is_empty() { format!("clip_{i:03}") } else { clip.name.clone() };
+        let is_taken = out.iter().any(|c| c.clip == name);
+        out.push(Clip {
+            clip: if is_taken { format!("{name}_{i}") } else { name },
+            start_frame: start,
+            end_frame: end,
+            narration: clip.narration.clone(),
+            verb: clip.verb.clone(),
+            noun: clip.noun.clone(),
+        });
+    }
+    if out.len() < source.clips.len() {
+        report.dropped.push(format!("{} narrations that lie outside the frames", source.clips.len() - out.len()));
+    }
+    report.streams.push(Stream {
+        stream: "clips".to_owned(),
+        count: out.len(),
+        of: source.clips.len(),
+        source: source_name(source),
+        joined_by: by.words().to_owned(),
+    });
+    out
+}
+
+/// First and last frame between two places: by time where both have one, else by the video's frames, else by name.
+fn span(timeline: &Timeline, start: &At, end: &At) -> Option<(usize, usize, By)> {
+    let frames = &timeline.frames;
+    let within = |by: By, first: Option<usize>, last: Option<usize>| match (first, last) {
+        (Some(a), Some(b)) if a <= b => Some((a, b, by)),
+        _ => None,
+    };
+    if let (Some(a), Some(b)) = (start.time_secs, end.time_secs) {
+        let first = frames.iter().position(|f| f.time_secs >= a);
+        return within(By::Time, first, frames.iter().rposition(|f| f.time_secs <= b));
+    }
+    if let (Some(a), Some(b)) = (start.index, end.index) {
+        let first = frames.iter().position(|f| f.at.index.is_some_and(|i| i >= a));
+        return within(By::Index, first, frames.iter().rposition(|f| f.at.index.is_some_and(|i| i <= b)));
+    }
+    let (a, b) = (start.name.as_ref()?, end.name.as_ref()?);
+    let first = frames.iter().position(|f| f.at.name.as_ref().is_some_and(|n| n >= a));
+    within(By::Name, first, frames.iter().rposition(|f| f.at.name.as_ref().is_some_and(|n| n <= b)))
+}
