@@ -71,3 +71,32 @@ pub(super) fn untouchable(said: &mut Said, model: &Model, tree: &Tree) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::super::{urdf, xml};
+    use super::*;
+
+    #[test]
+    fn a_part_without_a_shape_that_collides_cannot_be_touched() {
+        let faults = |shape: &str| {
+            let text = format!(
+                "<robot name=\"r\"><link name=\"world\"/><link name=\"door\">{shape}</link>\
+                 <joint name=\"hinge\" type=\"revolute\"><parent link=\"world\"/><child link=\"door\"/></joint></robot>"
+            );
+            let path = Path::new("m.urdf");
+            let model = urdf::from_element(path, &text, &xml::parse(path, &text).unwrap()).unwrap();
+            let mut said = Said::default();
+            untouchable(&mut said, &model, &model.tree().unwrap());
+            said.faults
+        };
+        let board = |tag: &str| format!("<{tag}><geometry><box size=\"0.6 0.02 0.6\"/></geometry></{tag}>");
+        assert!(faults(&board("collision")).is_empty());
+        for shape in [board("visual"), String::new()] {
+            let found = faults(&shape);
+            assert!(found.len() == 1 && found[0].contains("hinge: none of its part's shapes"), "{found:?}");
+        }
+    }
+}

@@ -144,7 +144,8 @@ mod tests {
         let (u, v) = sketch.pixel(10, 20);
         assert_eq!(sketch.sample(u, v), Some((10, 20)));
         assert!((sketch.camera(&camera).unproject(10.0, 20.0, p.z) - p).norm() < 1e-12);
-        assert!((sketch.normal(&camera, 10, 20, 3).unwrap() - normal).norm() < 1e-4);
+        // Over six samples of 5 cm, half a millimetre turns it by less than a hundredth.
+        assert!((sketch.normal(&camera, 10, 20, 3).unwrap() - normal).norm() < 1e-2);
         assert!(sketch.normal(&camera, 1, 20, 3).is_none());
     }
 }
