@@ -119,6 +119,15 @@ impl Opening {
                 shown(dir)
             );
         }
+        let repeated = recording.repeated_times();
+        if let Some(first) = repeated.first() {
+            eprintln!(
+                "{}: cameras.json: {} frames have the time of the frame before (frame {first} is the first): there no speed is \
+                 to be had; give each frame its own time",
+                shown(dir),
+                repeated.len()
+            );
+        }
         Ok(recording)
     }
 }

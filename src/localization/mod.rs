@@ -53,6 +53,8 @@ pub struct Footage<'a> {
     pub sketches: &'a BTreeMap<usize, Sketch>,
     /// When somebody is at work.
     pub at_work: &'a AtWork,
+    /// The recording with the depth factors under which regions are found: their voxels hold its points.
+    pub located: &'a Recording,
 }
 
 /// Finds the confident region of one clip, of which `frames` are the [`local_frames`].
@@ -127,13 +129,13 @@ fn within_reach(
 /// Points inside a region's voxels, of the views that it was found in: world, metres; at most [`MAX_POINTS`].
 #[must_use]
 pub fn inside(footage: &Footage, clip: &Clip, region: &Region, config: &config::Localization) -> Vec<Point> {
-    let Footage { recording, sketches, .. } = *footage;
+    let Footage { located, sketches, .. } = *footage;
     let mut views: Vec<&Sketch> = region.local_frames.iter().filter_map(|f| sketches.get(f)).collect();
     if config.closed_state_frames {
         views.extend(others(footage, clip, &region.local_frames, &region.grip));
     }
     let voxels: HashSet<[i32; 3]> = region.voxels.iter().copied().collect();
-    let points: Vec<Point> = within_reach(recording, &views, 0, region.class, &region.grip, config)
+    let points: Vec<Point> = within_reach(located, &views, 0, region.class, &region.grip, config)
         .into_iter()
         .map(|(_, p)| p)
         .filter(|p| voxels.contains(&voxels::index(p, region.voxel_m)))

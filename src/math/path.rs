@@ -1,9 +1,10 @@
 //! How well a motion of one degree of freedom explains a path: distances to a line, and to a direction (§A.7).
 
+use nalgebra::Point2;
 use wide::f64x4;
 
 use super::line::Line;
-use super::{Point, Vector, centroid, reject, stats};
+use super::{Point, Vector, centroid, circle, principal_directions, reject, stats};
 
 /// A path about a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -103,6 +104,23 @@ pub fn line_inliers(path: &[Point], direction: &Vector, tolerance: f64) -> Optio
     let mean = centroid(path)?;
     let inside = path.iter().filter(|p| reject(&(*p - mean), direction).norm() <= tolerance).count();
     Some(inside as f64 / path.len() as f64)
+}
+
+/// Root mean square distance of a path from the best circle or line of all, metres.
+#[must_use]
+pub fn beside_any_joint(path: &[Point]) -> f64 {
+    let Some((axes, variances)) = principal_directions(path) else { return 0.0 };
+    let Some(mean) = centroid(path) else { return 0.0 };
+    let flat: Vec<Point2<f64>> = path
+        .iter()
+        .map(|p| {
+            let d = p - mean;
+            Point2::new(d.dot(&axes.column(0)), d.dot(&axes.column(1)))
+        })
+        .collect();
+    let line = variances[1] + variances[2];
+    let arc = circle::fit(&flat).map_or(f64::INFINITY, |c| c.rms(&flat).powi(2) + variances[2]);
+    line.min(arc).max(0.0).sqrt()
 }
 
 #[cfg(test)]

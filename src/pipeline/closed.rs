@@ -2,8 +2,9 @@
 
 use super::ClipResult;
 use crate::config::{Config, InferenceMethod};
+use crate::geometry::Face;
 use crate::hands;
-use crate::math::Point;
+use crate::math::{Point, signed_angle};
 
 /// What parts open, standard deviation, metres: so far before its front a hand of another clip may have been lost.
 const TRAVEL_M: f64 = 0.3;
@@ -84,6 +85,23 @@ pub(super) fn by_trust(clips: &[ClipResult], members: &[usize], config: &Config)
     let mut trusted: Vec<(usize, f64)> = answered.map(|&c| (c, trust(clips, c, &grips, config))).collect();
     trusted.sort_by(|a, b| b.1.total_cmp(&a.1));
     trusted.into_iter().map(|(clip, _)| clip).collect()
+}
+
+/// Of the clips after the first one of `trusted` those that have a front of their own: each front once, the most trusted first.
+pub(super) fn other_fronts(clips: &[ClipResult], trusted: &[usize], config: &Config) -> Vec<usize> {
+    /// Two planes fitted to one front differ by a few centimetres.
+    const DEEPER_M: f64 = 0.08;
+    let one = |a: &Face, b: &Face| {
+        signed_angle(&a.normal, &b.normal) <= config.inference.merge_angle_deg.to_radians()
+            && a.coordinates(&b.center)[2].abs() <= DEEPER_M
+    };
+    let mut fronts: Vec<(usize, Face)> = Vec::new();
+    for (clip, face) in trusted.iter().filter_map(|&c| Some((c, clips[c].face?))) {
+        if !fronts.iter().any(|(_, other)| one(other, &face)) {
+            fronts.push((clip, face));
+        }
+    }
+    fronts.into_iter().map(|(clip, _)| clip).filter(|clip| trusted.first() != Some(clip)).collect()
 }
 
 #[cfg(test)]

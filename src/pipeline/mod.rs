@@ -269,12 +269,13 @@ pub fn infer(
     }
     look(&mut looks, still, true)?;
     look(&mut looks, followed.iter().flat_map(|f| f.open.iter().copied()).collect(), false)?;
-    let rectified = metric(recording, &looks);
+    let located_in = metric(recording, &looks);
     let total = recording.clips.len();
     start("localising", total);
-    let occupancy = config.localization.occlusion.then(|| views::Occupancy::of(&rectified, &looks.sketches));
+    let occupancy = config.localization.occlusion.then(|| views::Occupancy::of(&located_in, &looks.sketches));
     let idle = views::idle(recording, &at_work);
-    let footage = Footage { recording: &rectified, sketches: &looks.sketches, at_work: &at_work };
+    let footage =
+        Footage { recording: &located_in, sketches: &looks.sketches, at_work: &at_work, located: &located_in };
     let located: Vec<clip::Located> = recording
         .clips
         .par_iter()
@@ -290,7 +291,7 @@ pub fn infer(
     sort_unique(&mut wanted);
     look(&mut looks, wanted.clone(), true)?;
     // What more was looked at meanwhile tells the factors better, from where they are.
-    let rectified = metric(&rectified, &looks);
+    let rectified = metric(&located_in, &looks);
     start("finding lines", 1);
     for (frame, segments) in &mut looks.segments {
         let factor = rectified.depth_factor(*frame);
@@ -306,7 +307,7 @@ pub fn infer(
     let room = manhattan::estimate(&rectified, &with_normals_first(recording, &wanted), &config.geometry)?;
 
     start("inferring", total);
-    let footage = Footage { recording: &rectified, sketches: &looks.sketches, at_work: &at_work };
+    let footage = Footage { recording: &rectified, sketches: &looks.sketches, at_work: &at_work, located: &located_in };
     let seen = clip::Seen { footage, segments: &looks.segments, lines: &lines, room: room.as_ref() };
     let clips: Vec<ClipResult> = recording
         .clips

@@ -49,7 +49,7 @@ pub(super) fn cells(
     if !config.room {
         return None;
     }
-    let Footage { recording, sketches, at_work } = *footage;
+    let Footage { recording, sketches, at_work, .. } = *footage;
     let axes = grid_axes(manhattan, up);
     let edge_m = config.room_voxel_m;
     let needed = config.room_min_views as u32;

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::clip::{self, part_shape};
-use super::closed::{Grip, by_trust};
+use super::closed::{self, Grip, by_trust};
 use super::refit;
 use super::{ClipResult, Hypothesis, SceneJoint, told};
 use crate::articulation::{Articulation, JointKind};
@@ -15,7 +15,7 @@ use crate::hands::{self, Trajectory};
 use crate::inference::{self, aggregate, uncertainty};
 use crate::localization::Footage;
 use crate::math::Point;
-use crate::reasoning::{Answer, Question, Reasoner};
+use crate::reasoning::{self, Answer, Question, Reasoner};
 use crate::recording::narration;
 
 /// Whether a joint's hinge tells two parts apart: where its type is this sure, or nobody computed how sure it is.
@@ -249,24 +249,8 @@ impl<'a> Group<'a> {
 
 /// One part's joint, and how else it could move.
 fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
-    let mut look = judged(group, reasoner, &[])?;
-    let Group { clips, members, config, .. } = *group;
-    let around = around(group, look.best);
-    // Without the depth of the open states there are no other outlines than before.
-    if config.inference.method == InferenceMethod::Posterior && config.inference.second_look && config.inference.refit {
-        /// Less likely joints seldom become the answer, and all of them find their place under the others' outlines.
-        const LEAST_SHARE: f64 = 0.05;
-        let worth = look.likely.iter().enumerate().filter(|(i, l)| *i == 0 || l.share >= LEAST_SHARE);
-        // One round tells how far the part reaches; a second one is for the hinge.
-        let outlines: Vec<Rect> = worth.filter_map(|(_, l)| built(group, &look, l, &around, 1).part).collect();
-        if !outlines.is_empty() {
-            look = judged(group, reasoner, &outlines)?;
-        }
-    }
-    // What physics will not be asked about is not built.
-    let asked = if config.validation.feedback { look.likely.len() } else { 1 };
-    let hypotheses: Vec<Hypothesis> =
-        look.likely.iter().take(asked).map(|l| built(group, &look, l, &around, ROUNDS)).collect();
+    let Group { clips, members, .. } = *group;
+    let (look, hypotheses) = borne_out(group, reasoner)?;
     let answer = hypotheses.first()?.clone();
     Some(SceneJoint {
         id: String::new(),
@@ -291,15 +275,96 @@ fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
     })
 }
 
-/// All candidates of all clips of one part, judged on every clip: the best explains all of them.
+/// What the clips say together of the front of the one that saw it closed best. Where that leaves hands unexplained that another
+/// clip's front explains by far, it was no front of this part, and that other one's answer stands: hands are the evidence that
+/// asks for no front, and evidence under two fronts is not comparable otherwise.
+fn borne_out(group: &Group, reasoner: &dyn Reasoner) -> Option<(Judged, Vec<Hypothesis>)> {
+    /// So many fronts are tried beside the first.
+    const OTHERS: usize = 3;
+    let trusted = by_trust(group.clips, group.members, group.config);
+    let first = under_front(group, reasoner, &trusted)?;
+    let hands = Hands::of(group);
+    if group.config.inference.method == InferenceMethod::Paper || hands.best() - hands.nats(&first.1) <= BY_FAR {
+        return Some(first);
+    }
+    let others = closed::other_fronts(group.clips, &trusted, group.config);
+    others
+        .into_iter()
+        .take(OTHERS)
+        .filter_map(|clip| {
+            let of: Vec<usize> = std::iter::once(clip).chain(trusted.iter().copied().filter(|c| *c != clip)).collect();
+            under_front(group, reasoner, &of)
+        })
+        .filter(|other| hands.nats(&other.1) - hands.nats(&first.1) > BY_FAR)
+        .reduce(|best, next| if hands.nats(&next.1) > hands.nats(&best.1) { next } else { best })
+        .or(Some(first))
+}
+
+/// Log odds, nats, that no errors which the clips of a part share make up for.
+const BY_FAR: f64 = 6.0;
+
+/// The hands of a part's clips as evidence of its joint.
+struct Hands<'a> {
+    paths: Vec<Vec<Point>>,
+    config: &'a Config,
+}
+
+impl<'a> Hands<'a> {
+    fn of(group: &Group<'a>) -> Self {
+        Self { paths: group.shown().iter().map(|(_, hand)| hand.positions()).collect(), config: group.config }
+    }
+
+    /// How likely they are under an answer.
+    fn nats(&self, hypotheses: &[Hypothesis]) -> f64 {
+        let Config { reasoning, inference, .. } = self.config;
+        let of = |path: &[Point], joint| reasoning::path_log_likelihood(joint, path, reasoning, inference);
+        hypotheses.first().map_or(f64::NEG_INFINITY, |answer| {
+            self.paths.iter().map(|path| of(path, &answer.joint)).sum::<f64>() / reasoning.evidence_temperature
+        })
+    }
+
+    /// How likely they could be under any joint, each under its own.
+    fn best(&self) -> f64 {
+        let reasoning = &self.config.reasoning;
+        let of = |path: &Vec<Point>| {
+            let beside = crate::math::path::beside_any_joint(path);
+            reasoning::beside_log_likelihood(beside * beside, path.len(), reasoning)
+        };
+        self.paths.iter().map(of).sum::<f64>() / reasoning.evidence_temperature
+    }
+}
+
+/// The answer under the front of `trusted[0]`, the other clips behind it, and its hypotheses built.
+fn under_front(group: &Group, reasoner: &dyn Reasoner, trusted: &[usize]) -> Option<(Judged, Vec<Hypothesis>)> {
+    let mut look = judged(group, reasoner, trusted, &[])?;
+    let config = group.config;
+    let around = around(group, look.best);
+    // Without the depth of the open states there are no other outlines than before.
+    if config.inference.method == InferenceMethod::Posterior && config.inference.second_look && config.inference.refit {
+        /// Less likely joints seldom become the answer, and all of them find their place under the others' outlines.
+        const LEAST_SHARE: f64 = 0.05;
+        let worth = look.likely.iter().enumerate().filter(|(i, l)| *i == 0 || l.share >= LEAST_SHARE);
+        // One round tells how far the part reaches; a second one is for the hinge.
+        let outlines: Vec<Rect> = worth.filter_map(|(_, l)| built(group, &look, l, &around, 1).part).collect();
+        if !outlines.is_empty() {
+            look = judged(group, reasoner, trusted, &outlines)?;
+        }
+    }
+    // What physics will not be asked about is not built.
+    let asked = if config.validation.feedback { look.likely.len() } else { 1 };
+    let hypotheses: Vec<Hypothesis> =
+        look.likely.iter().take(asked).map(|l| built(group, &look, l, &around, ROUNDS)).collect();
+    Some((look, hypotheses))
+}
+
+/// All candidates of all clips of one part, judged on every clip: the best explains all of them. `trusted`: the clips with an
+/// answer; the first gives the face, the grip and the part's outline.
 ///
 /// `outlines`: of the part on the face of the clip that saw it best, one for each way in which it could move and left one, by
 /// falling likelihood; none in a first look, which takes what that clip knows. Every candidate is judged under the outline
 /// that suits it best.
-fn judged(group: &Group, reasoner: &dyn Reasoner, outlines: &[Rect]) -> Option<Judged> {
+fn judged(group: &Group, reasoner: &dyn Reasoner, trusted: &[usize], outlines: &[Rect]) -> Option<Judged> {
     let Group { footage: Footage { recording, sketches, .. }, clips, members, config } = *group;
-    // The clip that saw the closed part best gives the face, the grip and the part's outline.
-    let trusted = by_trust(clips, members, config);
     let best = *trusted.first()?;
     let best_joint = clips[best].joint.found()?;
     let grip = best_joint.grip;

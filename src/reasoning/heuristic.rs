@@ -7,7 +7,7 @@
 use crate::articulation::JointKind;
 use crate::config;
 use crate::geometry::{AxisCandidate, AxisSource, Face, HingeSide};
-use crate::math::{Point, Vector, path};
+use crate::math::{Point, Vector};
 use crate::recording::narration::{self, Hung};
 
 use super::words::line_factor;
@@ -33,7 +33,13 @@ impl Reasoner for Geometric {
             .iter()
             .zip(question.agreement)
             .map(|(candidate, agreement)| {
-                (self.path_log_likelihood(candidate, question) + agreement) / self.reasoning.evidence_temperature
+                let path = super::path_log_likelihood(
+                    &candidate.joint,
+                    question.path,
+                    &self.reasoning,
+                    &self.inference,
+                );
+                (path + agreement) / self.reasoning.evidence_temperature
             })
             .collect();
         let name = match question.reading.kind {
@@ -55,32 +61,6 @@ impl Reasoner for Geometric {
 /// say the same it is one voice, and the louder counts; where they differ, the model saw something else, and both count.
 fn of_both(name: f64, model: f64) -> f64 {
     if name * model > 0.0 { name.signum() * name.abs().max(model.abs()) } else { name + model }
-}
-
-impl Geometric {
-    /// How well the path fits: heavy-tailed, with as many independent samples as a correlated hand track is worth.
-    fn path_log_likelihood(&self, candidate: &AxisCandidate, question: &Question) -> f64 {
-        let variance = match candidate.joint.kind {
-            JointKind::Prismatic => {
-                let Some(variance) = path::across(question.path, &candidate.joint.axis) else {
-                    return f64::NEG_INFINITY;
-                };
-                variance
-            }
-            JointKind::Revolute => {
-                let Some(fit) = path::about_line(question.path, &candidate.joint.line()) else {
-                    return f64::NEG_INFINITY;
-                };
-                if fit.radius > self.inference.max_radius_m || fit.radius < self.inference.min_radius_m {
-                    return f64::NEG_INFINITY;
-                }
-                fit.variance()
-            }
-        };
-        let sigma2 = self.reasoning.hand_std_m.powi(2);
-        let samples = self.reasoning.effective_samples.min(question.path.len() as f64);
-        -samples * (1.0 + variance / (2.0 * sigma2)).ln()
-    }
 }
 
 /// Prior of each candidate: that of its source, shared among the candidates of that source (thirty lines are not thirty

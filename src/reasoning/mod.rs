@@ -12,10 +12,11 @@ pub mod words;
 
 use serde::{Deserialize, Serialize};
 
-use crate::articulation::JointKind;
+use crate::articulation::{Articulation, JointKind};
+use crate::config;
 use crate::error::Result;
 use crate::geometry::{AxisCandidate, Face};
-use crate::math::{Point, Vector, stats};
+use crate::math::{Point, Vector, path, stats};
 use crate::recording::narration::Reading;
 
 /// What is known when the questions are asked.
@@ -120,4 +121,28 @@ pub trait Reasoner: Sync {
 
     /// Its name, for the evidence.
     fn name(&self) -> &'static str;
+}
+/// How well a hand's path fits a joint, nats up to a constant: heavy-tailed, with as many independent samples as a correlated
+/// hand track is worth. Minus infinity for a hinge that no hand of such a part is so near to, or so far from.
+#[must_use]
+pub fn path_log_likelihood(
+    joint: &Articulation,
+    path: &[Point],
+    reasoning: &config::Reasoning,
+    inference: &config::Inference,
+) -> f64 {
+    let variance = match joint.kind {
+        JointKind::Prismatic => path::across(path, &joint.axis),
+        JointKind::Revolute => path::about_line(path, &joint.line())
+            .filter(|fit| (inference.min_radius_m..=inference.max_radius_m).contains(&fit.radius))
+            .map(|fit| fit.variance()),
+    };
+    variance.map_or(f64::NEG_INFINITY, |variance| beside_log_likelihood(variance, path.len(), reasoning))
+}
+
+/// The same for a path of so many samples that lies beside a motion by this mean square, m^2.
+#[must_use]
+pub fn beside_log_likelihood(variance: f64, samples: usize, reasoning: &config::Reasoning) -> f64 {
+    let samples = reasoning.effective_samples.min(samples as f64);
+    -samples * (1.0 + variance / (2.0 * reasoning.hand_std_m.powi(2))).ln()
 }

@@ -282,6 +282,13 @@ impl Recording {
         self.frames.get(frame).and_then(|f| f.files.segments.as_deref()).map(segments::read).transpose()
     }
 
+    /// Frames that have the time of the frame before: a speed between the two is not to be had.
+    #[must_use]
+    pub fn repeated_times(&self) -> Vec<usize> {
+        let times: Vec<f64> = self.frames.iter().map(|f| f.timestamp_secs).collect();
+        (1..times.len()).filter(|&f| times[f] <= times[f - 1]).collect()
+    }
+
     /// The hands of frames `from..=to`; [`Recording::hands`] are in the order of frames.
     #[must_use]
     pub fn hands_in(&self, from: usize, to: usize) -> &[HandSample] {

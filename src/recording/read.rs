@@ -225,7 +225,7 @@ fn frames(folder: &Folder, file: &CamerasFile, faults: &mut Faults) -> Vec<Frame
     out
 }
 
-/// Times increase strictly: a speed is a distance over a time.
+/// Times do not go back. Two frames of one time are told by whoever opens the recording ([`Recording::repeated_times`]).
 fn check_time(time: f64, last: &mut f64, place: &str, faults: &mut Faults) {
     // Between two frames of one recording; what is further apart was taken by two clocks.
     const DAY_SECS: f64 = 86_400.0;
@@ -233,11 +233,7 @@ fn check_time(time: f64, last: &mut f64, place: &str, faults: &mut Faults) {
         faults.add("time", format!("{place}: timestamp {time} s does not follow {last} s"));
         return;
     }
-    if time == *last {
-        let fault =
-            format!("timestamp {time} s is that of the frame before; times must increase, leave one of the frames out");
-        faults.add("time", format!("{place}: {fault}"));
-    } else if last.is_finite() && time - *last > DAY_SECS {
+    if last.is_finite() && time - *last > DAY_SECS {
         let fault = format!("timestamp {time} s is more than a day after {last} s; write seconds of one clock");
         faults.add("time", format!("{place}: {fault}"));
     }

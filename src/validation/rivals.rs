@@ -3,14 +3,13 @@
 //! A simulated replay without obstacles adds next to nothing to this distance, and costs a thousand times as much: all
 //! rivals are compared here, the best one is then simulated.
 
-use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
 use crate::articulation::{Articulation, JointKind};
 use crate::config;
 use crate::hands::Trajectory;
 use crate::inference::openings;
-use crate::math::{Point, Vector, centroid, circle, principal_directions, reject, unit, unsigned_angle};
+use crate::math::{Point, Vector, path, reject, unit, unsigned_angle};
 use crate::twin::{Part, Role};
 
 /// One clip's hand as evidence.
@@ -48,26 +47,10 @@ impl Evidence {
             times_secs: trajectory.samples.iter().map(|s| s.time_secs - first.time_secs).collect(),
             closed: trajectory.closed_grip(),
             samples,
-            noise_m: smoothed_away.max(beside_any_joint(&path)),
+            noise_m: smoothed_away.max(path::beside_any_joint(&path)),
             path,
         })
     }
-}
-
-/// Root mean square distance of a path from the best circle or line of all, metres.
-fn beside_any_joint(path: &[Point]) -> f64 {
-    let Some((axes, variances)) = principal_directions(path) else { return 0.0 };
-    let Some(mean) = centroid(path) else { return 0.0 };
-    let flat: Vec<Point2<f64>> = path
-        .iter()
-        .map(|p| {
-            let d = p - mean;
-            Point2::new(d.dot(&axes.column(0)), d.dot(&axes.column(1)))
-        })
-        .collect();
-    let line = variances[1] + variances[2];
-    let arc = circle::fit(&flat).map_or(f64::INFINITY, |c| c.rms(&flat).powi(2) + variances[2]);
-    line.min(arc).max(0.0).sqrt()
 }
 
 /// The grip on the closed part that suits a whole path best (errors of the closed end alone would move the entire motion),
@@ -324,12 +307,12 @@ mod tests {
     #[test]
     fn a_trembling_hand_is_noisy_whatever_the_joint_and_a_clean_arc_is_not() {
         let clean = evidence(&HINGE, 1.2).path;
-        assert!(beside_any_joint(&clean) < 1e-6);
+        assert!(path::beside_any_joint(&clean) < 1e-6);
         let shaken: Vec<Point> = clean
             .iter()
             .enumerate()
             .map(|(i, p)| p + Vector::new(0.0, 0.0, if i % 2 == 0 { 0.05 } else { -0.05 }))
             .collect();
-        assert!((beside_any_joint(&shaken) - 0.05).abs() < 0.01);
+        assert!((path::beside_any_joint(&shaken) - 0.05).abs() < 0.01);
     }
 }
