@@ -100,6 +100,7 @@ fn view_select(c: &mut Criterion) {
             min_views: 4,
             class: None,
             local_frames: Vec::new(),
+            other_frames: Vec::new(),
             viewpoint: Point::origin(),
             grip: Point::origin(),
         };

@@ -386,6 +386,7 @@ mod tests {
             min_views: 4,
             class: None,
             local_frames: Vec::new(),
+            other_frames: Vec::new(),
             viewpoint: Point::origin(),
             grip: Point::origin(),
         };

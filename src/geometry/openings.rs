@@ -319,8 +319,7 @@ struct Solved {
 impl Equations {
     /// The views are eliminated one by one: time grows with their number. `None` where there is no solution.
     fn solved(&self) -> Option<Solved> {
-        let inverses: Vec<Matrix2<f64>> =
-            self.views.iter().map(|v| v.own.try_inverse()).collect::<Option<_>>()?;
+        let inverses: Vec<Matrix2<f64>> = self.views.iter().map(|v| v.own.try_inverse()).collect::<Option<_>>()?;
         let (mut hinge, mut rhs) = (self.hinge, self.hinge_rhs);
         for (view, inverse) in self.views.iter().zip(&inverses) {
             let by = view.with_hinge * inverse;

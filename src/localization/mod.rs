@@ -27,6 +27,9 @@ pub struct Region {
     pub class: Option<u8>,
     /// The local frames.
     pub local_frames: Vec<usize>,
+    /// Frames of the whole recording in which nobody is at work that show it, too.
+    #[serde(skip)]
+    pub other_frames: Vec<usize>,
     /// Camera centre of the local frame nearest to the interaction: the side from which the furniture is used.
     pub viewpoint: Point,
     /// The grip at the closed end.
@@ -79,8 +82,8 @@ pub fn localize(
         return Outcome::Abstained("no depth within reach of the hand in the local frames".to_owned());
     }
     // A person at a door sees half of it: frames of the whole recording in which nobody is at work show the rest.
-    if config.closed_state_frames {
-        let others = others(footage, clip, frames, &grip);
+    let others = if config.closed_state_frames { others(footage, clip, frames, &grip) } else { Vec::new() };
+    if !others.is_empty() {
         seen.extend(within_reach(recording, &others, images.len(), class, &grip, config));
     }
     let counts = voxels::count_views(&seen, config.voxel_m);
@@ -101,6 +104,7 @@ pub fn localize(
                 min_views,
                 class,
                 local_frames: frames.to_vec(),
+                other_frames: others.iter().map(|s| s.frame).collect(),
                 viewpoint: recording.frames[nearest].center(),
                 grip,
             });
@@ -128,12 +132,10 @@ fn within_reach(
 
 /// Points inside a region's voxels, of the views that it was found in: world, metres; at most [`MAX_POINTS`].
 #[must_use]
-pub fn inside(footage: &Footage, clip: &Clip, region: &Region, config: &config::Localization) -> Vec<Point> {
+pub fn inside(footage: &Footage, region: &Region, config: &config::Localization) -> Vec<Point> {
     let Footage { located, sketches, .. } = *footage;
-    let mut views: Vec<&Sketch> = region.local_frames.iter().filter_map(|f| sketches.get(f)).collect();
-    if config.closed_state_frames {
-        views.extend(others(footage, clip, &region.local_frames, &region.grip));
-    }
+    let frames = region.local_frames.iter().chain(&region.other_frames);
+    let views: Vec<&Sketch> = frames.filter_map(|f| sketches.get(f)).collect();
     let voxels: HashSet<[i32; 3]> = region.voxels.iter().copied().collect();
     let points: Vec<Point> = within_reach(located, &views, 0, region.class, &region.grip, config)
         .into_iter()
@@ -199,7 +201,9 @@ pub fn local_frames(
     ];
     let mut chosen: Vec<usize> = match trajectory.action {
         // The first moment of contact has not moved the part yet.
-        Action::Open => (0..=begin.min(last)).rev().filter(|f| !at_work.other(*f, clip)).filter(usable).take(want).collect(),
+        Action::Open => {
+            (0..=begin.min(last)).rev().filter(|f| !at_work.other(*f, clip)).filter(usable).take(want).collect()
+        }
         Action::Close => (end.max(first)..recording.frames.len())
             .take_while(|f| !at_work.other(*f, clip))
             .filter(usable)

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use crate::config;
 use crate::math::{Point, centroid};
-use crate::recording::{AtWork, Recording};
 use crate::recording::sketch::Sketch;
+use crate::recording::{AtWork, Recording};
 
 use super::{Region, voxels};
 

@@ -91,8 +91,7 @@ pub fn to_ruled_twin(model: &Model) -> (Twin, ContactRules, Vec<String>) {
     }
     boards(model, &tree, &poses, &built, &mut twin, &mut names, &mut notes);
     let contacts = Contacts::of(model, &tree);
-    let rules =
-        ContactRules { solids: names.solids, excluded: contacts.excluded_pairs(), family: contacts.families() };
+    let rules = ContactRules { solids: names.solids, excluded: contacts.excluded_pairs(), family: contacts.families() };
     (twin, rules, notes)
 }
 

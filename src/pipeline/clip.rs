@@ -127,7 +127,7 @@ pub(super) fn infer(
         }
     };
     result.words = reasoner.words(&Sight { recording, clip, region, views: &result.views, lines: &result.lines })?;
-    let surface = surface(&seen.footage, clip, region, &result.views, config);
+    let surface = surface(&seen.footage, region, &result.views, config);
     let furniture = reasoning::furniture(&located.reading, result.words.as_ref());
     let around = face::Surroundings {
         surface: &surface,
@@ -221,14 +221,8 @@ pub(super) fn upward(recording: &Recording, room: Option<&ManhattanFrame>) -> cr
 }
 
 /// Points of the touched furniture: of the local frames, and of the global views where masks tell what belongs to it.
-pub(super) fn surface(
-    footage: &Footage,
-    clip: &Clip,
-    region: &Region,
-    views: &[usize],
-    config: &Config,
-) -> Vec<Point> {
-    let mut points = localization::inside(footage, clip, region, &config.localization);
+pub(super) fn surface(footage: &Footage, region: &Region, views: &[usize], config: &Config) -> Vec<Point> {
+    let mut points = localization::inside(footage, region, &config.localization);
     for sketch in views.iter().filter_map(|v| footage.sketches.get(v)) {
         let near = |p: &Point| (p - region.grip).norm() <= config.localization.reach_m;
         points.extend(localization::points(footage.recording, sketch, region.class).into_iter().filter(near));

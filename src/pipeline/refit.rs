@@ -83,8 +83,7 @@ pub(super) fn refitted<'a>(
     let noise = openings::Noise { hinge_m: believed.hinge_m, board_m: config.fitting.board_m };
     let views: Vec<Vec<moved::View>> =
         shown.iter().map(|(clip, t)| moved::open_views(recording, sketches, &clip.clip, t)).collect();
-    let still: Vec<Vec<moved::View>> =
-        shown.iter().map(|(clip, t)| closed_views(footage, clip, t, config)).collect();
+    let still: Vec<Vec<moved::View>> = shown.iter().map(|(clip, t)| closed_views(footage, clip, t, config)).collect();
     let states: Vec<OpenState> = shown
         .iter()
         .zip(views.iter().zip(&still))

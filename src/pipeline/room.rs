@@ -54,9 +54,8 @@ pub(super) fn cells(
     let edge_m = config.room_voxel_m;
     let needed = config.room_min_views as u32;
     // A frame without depth of its own has the reconstruction's, which is taken whole below.
-    let still = |frame: usize| {
-        !at_work.any(frame) && recording.frames.get(frame).is_some_and(|f| f.files.depth.is_some())
-    };
+    let still =
+        |frame: usize| !at_work.any(frame) && recording.frames.get(frame).is_some_and(|f| f.files.depth.is_some());
     let still: Vec<&Sketch> = sketches.values().filter(|s| still(s.frame)).collect();
     let mut bins: Vec<Bin> = Vec::new();
     // In pieces: the bins of all views of a long recording together are larger than the room by far.

@@ -481,9 +481,10 @@ struct Around {
 /// Of the clip that saw the closed part best.
 fn around(group: &Group, best: usize) -> Around {
     let clip = &group.clips[best];
-    let surface = clip.region.as_ref().map_or_else(Vec::new, |region| {
-        clip::surface(&group.footage, &clip.clip, region, &clip.views, group.config)
-    });
+    let surface = clip
+        .region
+        .as_ref()
+        .map_or_else(Vec::new, |region| clip::surface(&group.footage, &clip.clip, region, &clip.views, group.config));
     Around { surface, stops: clip.face.as_ref().map_or_else(Vec::new, |face| clip::edges_on(face, &clip.lines)) }
 }
 

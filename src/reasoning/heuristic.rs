@@ -33,12 +33,8 @@ impl Reasoner for Geometric {
             .iter()
             .zip(question.agreement)
             .map(|(candidate, agreement)| {
-                let path = super::path_log_likelihood(
-                    &candidate.joint,
-                    question.path,
-                    &self.reasoning,
-                    &self.inference,
-                );
+                let path =
+                    super::path_log_likelihood(&candidate.joint, question.path, &self.reasoning, &self.inference);
                 (path + agreement) / self.reasoning.evidence_temperature
             })
             .collect();
