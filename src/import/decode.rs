@@ -180,6 +180,9 @@ fn pgm(blob: &Blob, unit_m: f64) -> Result<Grid<f32>> {
 
 fn npy(blob: &Blob, unit_m: f64) -> Result<Grid<f32>> {
     let bytes = blob.read()?;
+    if let Some(why) = crate::recording::npy::refused(&bytes) {
+        return Err(blob.fault(format!("is no numpy array ({why})")));
+    }
     let array = npyz::NpyFile::new(bytes.as_slice()).map_err(|e| blob.fault(format!("is no numpy array ({e})")))?;
     let shape: Vec<u64> = array.shape().iter().copied().filter(|n| *n != 1).collect();
     let [height, width] = shape.as_slice() else {
