@@ -7,10 +7,12 @@ use image::{DynamicImage, ImageReader};
 use super::blob::Blob;
 use super::capture::{ByteOrder, Depth, DepthCoding};
 use crate::error::{Error, Result};
-use crate::recording::Grid;
+use crate::recording::{Grid, images};
 
 /// A decoder may claim any size; a 4K RGB image needs 25 MB.
 const MAX_DECODED_BYTES: u64 = 512 << 20;
+/// Numbers that one byte of a file can stand for: deflate makes at most 1032 bytes of one, run lengths of wavelets more.
+const MOST_OF_A_BYTE: usize = 32 << 10;
 /// More pixels than any camera here has.
 const MAX_PIXELS: usize = 64 << 20;
 
@@ -20,13 +22,17 @@ const MAX_PIXELS: usize = 64 << 20;
 /// Where the bytes cannot be read or are no image.
 pub fn picture(blob: &Blob) -> Result<DynamicImage> {
     let bytes = blob.read()?;
+    let file_bytes = bytes.len() as u64;
     let mut reader = ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()
         .map_err(|e| blob.fault(format!("cannot be read ({e})")))?;
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(MAX_DECODED_BYTES);
     reader.limits(limits);
-    reader.decode().map_err(|e| blob.fault(format!("is no image that can be decoded ({e}); JPEG and PNG can")))
+    let wrong = |e: image::ImageError| blob.fault(format!("is no image that can be decoded ({e}); JPEG and PNG can"));
+    let decoder = reader.into_decoder().map_err(wrong)?;
+    images::believable(&decoder, file_bytes).map_err(|e| blob.fault(e))?;
+    DynamicImage::from_decoder(decoder).map_err(wrong)
 }
 
 /// Values of 8 bits of a grey image, or one byte a pixel of a raw array of a known size.
@@ -220,6 +226,10 @@ fn open_exr(blob: &Blob) -> Result<Grid<f32>> {
     }
     if pixels > MAX_PIXELS {
         return Err(blob.fault(format!("claims {pixels} numbers; depth has one channel")));
+    }
+    if pixels > bytes.len().saturating_mul(MOST_OF_A_BYTE) {
+        let length = bytes.len();
+        return Err(blob.fault(format!("claims {pixels} numbers, too many for its {length} bytes; is it cut off?")));
     }
     let image = exr::prelude::read()
         .no_deep_data()

@@ -2,6 +2,9 @@
 
 use crate::math::{Point, Vector};
 
+/// The longer side of an image over the shorter one, at the most; panoramas have 4.
+const MOST_STRETCHED: usize = 16;
+
 /// How a lens bends rays, with x = X/Z and y = Y/Z, or the angle to the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Lens {
@@ -85,6 +88,10 @@ impl Optics {
         let (w, h) = (self.width, self.height);
         if w == 0 || h == 0 || w.saturating_mul(h) > 64 << 20 {
             return Some(format!("an image of {w} x {h} pixels is not a camera's"));
+        }
+        // The size of the output follows from the shape: a strip of a pixel's width would ask for millions of rows.
+        if w.max(h) / w.min(h) > MOST_STRETCHED {
+            return Some(format!("an image of {w} x {h} pixels has no camera's shape"));
         }
         if !(self.fx.is_finite() && self.fy.is_finite() && self.fx > 1.0 && self.fy > 1.0) {
             return Some(format!("fx {}, fy {} must be focal lengths in pixels", self.fx, self.fy));
@@ -291,6 +298,21 @@ mod tests {
         assert!(
             fish.project(&Point::new(1.0, 0.0, 0.0)).is_some() && one.project(&Point::new(1.0, 0.0, 0.0)).is_none()
         );
+    }
+
+    #[test]
+    fn what_no_camera_has_is_refused_in_words() {
+        for (width, height, focal, word) in [
+            (640, 480, 400.0, ""),
+            (0, 480, 400.0, "is not a camera's"),
+            (1 << 40, 1 << 40, 400.0, "is not a camera's"),
+            (1, 1 << 26, 400.0, "no camera's shape"),
+            (1 << 20, 16, 400.0, "no camera's shape"),
+            (640, 480, f64::INFINITY, "focal lengths"),
+        ] {
+            let fault = Optics::pinhole(width, height, [focal, focal, 1.0, 1.0]).fault().unwrap_or_default();
+            assert!(fault.contains(word) && fault.is_empty() == word.is_empty(), "{word}: {fault}");
+        }
     }
 
     #[test]
