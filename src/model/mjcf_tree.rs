@@ -163,3 +163,24 @@ fn rename(element: &mut Element, names: &BTreeSet<String>, suffix: &str) {
     }
     element.children.iter_mut().for_each(|c| rename(c, names, suffix));
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_many_copies_share_are_followed_once() {
+        let name = |depth: usize| format!("a{}", "0".repeat(depth));
+        let names = (0..40).map(|depth| (name(depth), vec![name(depth + 1); 9])).collect();
+        let copies = Copies { names, elements: 0 };
+        assert_eq!(copies.of("a"), [name(40)]);
+        assert_eq!(copies.of("b"), ["b"]);
+    }
+
+    #[test]
+    fn attributes_and_long_values_count_where_copies_are_made() {
+        let text = format!("<mujoco><geom a='1' b='{}'/></mujoco>", "x".repeat(6400));
+        let root = xml::parse(Path::new("m.xml"), &text).unwrap();
+        assert_eq!(size(&root), 1 + 1 + 1 + 101);
+    }
+}
