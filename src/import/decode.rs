@@ -291,6 +291,40 @@ mod tests {
         assert_eq!(depth(&inline(&[0xE8, 3, 1, 0]), Some(&sure), &how(coding)).unwrap().data, [1.0, 0.0]);
     }
 
+    /// A grey PNG that claims a size and holds next to nothing.
+    fn hollow(width: u32, height: u32) -> Vec<u8> {
+        let chunk = |kind: &[u8], data: &[u8]| -> Vec<u8> {
+            let body = [kind, data].concat();
+            let crc = !body.iter().fold(u32::MAX, |crc, byte| {
+                (0..8).fold(crc ^ u32::from(*byte), |c, _| if c & 1 == 1 { (c >> 1) ^ 0xEDB8_8320 } else { c >> 1 })
+            });
+            let length = data.len() as u32;
+            [length.to_be_bytes().as_slice(), body.as_slice(), crc.to_be_bytes().as_slice()].concat()
+        };
+        let size = [width.to_be_bytes(), height.to_be_bytes()].concat();
+        let header = [size.as_slice(), [8u8, 0, 0, 0, 0].as_slice()].concat();
+        [b"\x89PNG\r\n\x1a\n".to_vec(), chunk(b"IHDR", &header), chunk(b"IDAT", &[0; 8]), chunk(b"IEND", &[])].concat()
+    }
+
+    #[test]
+    fn an_image_that_its_bytes_cannot_hold_is_refused_before_it_is_decoded() {
+        for (size, word) in [(8000, "too many for its"), (20_000, "more than any camera"), (2, "no image that can")] {
+            let error = grey(&inline(&hollow(size, size))).unwrap_err().to_string();
+            assert!(error.contains(word), "{size}: {error}");
+        }
+    }
+
+    #[test]
+    fn numpy_headers_that_nest_or_claim_too_much_are_refused() {
+        for (text, word) in [("(".repeat(500), "deeper"), ("{'shape': (4294967296,4294967296)}".to_owned(), "claims")] {
+            let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+            bytes.extend((text.len() as u16).to_le_bytes());
+            bytes.extend(text.as_bytes());
+            let error = depth(&inline(&bytes), None, &how(DepthCoding::Npy { unit_m: 1.0 })).unwrap_err().to_string();
+            assert!(error.contains(word), "{error}");
+        }
+    }
+
     #[test]
     fn grey_maps_have_comments_and_two_bytes() {
         let mut bytes = b"P5\n# hololens\n2 1\n65535\n".to_vec();
