@@ -26,7 +26,8 @@ pub fn run(format: &Format, files: &mut Files, bytes: &[u8]) {
         width: 64,
         // Programs cost milliseconds each.
         ffmpeg: Some(PathBuf::from("/nowhere/ffmpeg")),
-        // With and without.
+        // With and without; most scales are not known.
+        scale: (bytes.len() % 3 != 0).then_some(1.0),
         camera: (bytes.len() % 2 == 0).then(|| Optics::pinhole(64, 48, [40.0, 40.0, 31.5, 23.5])),
         ..Options::default()
     };
