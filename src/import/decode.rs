@@ -7,10 +7,12 @@ use image::{DynamicImage, ImageReader};
 use super::blob::Blob;
 use super::capture::{ByteOrder, Depth, DepthCoding};
 use crate::error::{Error, Result};
-use crate::recording::Grid;
+use crate::recording::{Grid, images};
 
 /// A decoder may claim any size; a 4K RGB image needs 25 MB.
 const MAX_DECODED_BYTES: u64 = 512 << 20;
+/// Numbers that one byte of a file can stand for: deflate makes at most 1032 bytes of one, run lengths of wavelets more.
+const MOST_OF_A_BYTE: usize = 32 << 10;
 /// More pixels than any camera here has.
 const MAX_PIXELS: usize = 64 << 20;
 
@@ -20,13 +22,17 @@ const MAX_PIXELS: usize = 64 << 20;
 /// Where the bytes cannot be read or are no image.
 pub fn picture(blob: &Blob) -> Result<DynamicImage> {
     let bytes = blob.read()?;
+    let file_bytes = bytes.len() as u64;
     let mut reader = ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()
         .map_err(|e| blob.fault(format!("cannot be read ({e})")))?;
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(MAX_DECODED_BYTES);
     reader.limits(limits);
-    reader.decode().map_err(|e| blob.fault(format!("is no image that can be decoded ({e}); JPEG and PNG can")))
+    let wrong = |e: image::ImageError| blob.fault(format!("is no image that can be decoded ({e}); JPEG and PNG can"));
+    let decoder = reader.into_decoder().map_err(wrong)?;
+    images::believable(&decoder, file_bytes).map_err(|e| blob.fault(e))?;
+    DynamicImage::from_decoder(decoder).map_err(wrong)
 }
 
 /// Values of 8 bits of a grey image, or one byte a pixel of a raw array of a known size.
@@ -180,6 +186,9 @@ fn pgm(blob: &Blob, unit_m: f64) -> Result<Grid<f32>> {
 
 fn npy(blob: &Blob, unit_m: f64) -> Result<Grid<f32>> {
     let bytes = blob.read()?;
+    if let Some(why) = crate::recording::npy::refused(&bytes) {
+        return Err(blob.fault(format!("is no numpy array ({why})")));
+    }
     let array = npyz::NpyFile::new(bytes.as_slice()).map_err(|e| blob.fault(format!("is no numpy array ({e})")))?;
     let shape: Vec<u64> = array.shape().iter().copied().filter(|n| *n != 1).collect();
     let [height, width] = shape.as_slice() else {
@@ -217,6 +226,10 @@ fn open_exr(blob: &Blob) -> Result<Grid<f32>> {
     }
     if pixels > MAX_PIXELS {
         return Err(blob.fault(format!("claims {pixels} numbers; depth has one channel")));
+    }
+    if pixels > bytes.len().saturating_mul(MOST_OF_A_BYTE) {
+        let length = bytes.len();
+        return Err(blob.fault(format!("claims {pixels} numbers, too many for its {length} bytes; is it cut off?")));
     }
     let image = exr::prelude::read()
         .no_deep_data()
@@ -276,6 +289,40 @@ mod tests {
         let coding = DepthCoding::RawU16 { width: 2, height: 1, order: ByteOrder::Little, unit_m: 0.001 };
         let sure = inline(&[2, 1]);
         assert_eq!(depth(&inline(&[0xE8, 3, 1, 0]), Some(&sure), &how(coding)).unwrap().data, [1.0, 0.0]);
+    }
+
+    /// A grey PNG that claims a size and holds next to nothing.
+    fn hollow(width: u32, height: u32) -> Vec<u8> {
+        let chunk = |kind: &[u8], data: &[u8]| -> Vec<u8> {
+            let body = [kind, data].concat();
+            let crc = !body.iter().fold(u32::MAX, |crc, byte| {
+                (0..8).fold(crc ^ u32::from(*byte), |c, _| if c & 1 == 1 { (c >> 1) ^ 0xEDB8_8320 } else { c >> 1 })
+            });
+            let length = data.len() as u32;
+            [length.to_be_bytes().as_slice(), body.as_slice(), crc.to_be_bytes().as_slice()].concat()
+        };
+        let size = [width.to_be_bytes(), height.to_be_bytes()].concat();
+        let header = [size.as_slice(), [8u8, 0, 0, 0, 0].as_slice()].concat();
+        [b"\x89PNG\r\n\x1a\n".to_vec(), chunk(b"IHDR", &header), chunk(b"IDAT", &[0; 8]), chunk(b"IEND", &[])].concat()
+    }
+
+    #[test]
+    fn an_image_that_its_bytes_cannot_hold_is_refused_before_it_is_decoded() {
+        for (size, word) in [(8000, "too many for its"), (20_000, "more than any camera"), (2, "no image that can")] {
+            let error = grey(&inline(&hollow(size, size))).unwrap_err().to_string();
+            assert!(error.contains(word), "{size}: {error}");
+        }
+    }
+
+    #[test]
+    fn numpy_headers_that_nest_or_claim_too_much_are_refused() {
+        for (text, word) in [("(".repeat(500), "deeper"), ("{'shape': (4294967296,4294967296)}".to_owned(), "claims")] {
+            let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+            bytes.extend((text.len() as u16).to_le_bytes());
+            bytes.extend(text.as_bytes());
+            let error = depth(&inline(&bytes), None, &how(DepthCoding::Npy { unit_m: 1.0 })).unwrap_err().to_string();
+            assert!(error.contains(word), "{error}");
+        }
     }
 
     #[test]

@@ -2,6 +2,9 @@
 
 use crate::math::{Point, Vector};
 
+/// The longer side of an image over the shorter one, at the most; panoramas have 4.
+const MOST_STRETCHED: usize = 16;
+
 /// How a lens bends rays, with x = X/Z and y = Y/Z, or the angle to the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Lens {
@@ -86,11 +89,17 @@ impl Optics {
         if w == 0 || h == 0 || w.saturating_mul(h) > 64 << 20 {
             return Some(format!("an image of {w} x {h} pixels is not a camera's"));
         }
-        if !(self.fx.is_finite() && self.fy.is_finite() && self.fx > 1.0 && self.fy > 1.0) {
+        // The size of the output follows from the shape: a strip of a pixel's width would ask for millions of rows.
+        if w.max(h) / w.min(h) > MOST_STRETCHED {
+            return Some(format!("an image of {w} x {h} pixels has no camera's shape"));
+        }
+        // A thousand image widths see a thousandth of a radian, which no lens here does: as recordings have it.
+        let widest = 1e3 * w.max(h) as f64;
+        if ![self.fx, self.fy].iter().all(|f| *f > 1.0 && *f < widest) {
             return Some(format!("fx {}, fy {} must be focal lengths in pixels", self.fx, self.fy));
         }
-        if !(self.cx.is_finite() && self.cy.is_finite()) {
-            return Some(format!("cx {}, cy {} must be finite pixels", self.cx, self.cy));
+        if ![self.cx, self.cy].iter().all(|c| c.abs() < widest) {
+            return Some(format!("cx {}, cy {} must be pixels on the image or near it", self.cx, self.cy));
         }
         let finite = match self.lens {
             Lens::Pinhole => true,
@@ -291,6 +300,23 @@ mod tests {
         assert!(
             fish.project(&Point::new(1.0, 0.0, 0.0)).is_some() && one.project(&Point::new(1.0, 0.0, 0.0)).is_none()
         );
+    }
+
+    #[test]
+    fn what_no_camera_has_is_refused_in_words() {
+        for (width, height, focal, word) in [
+            (640, 480, 400.0, ""),
+            (0, 480, 400.0, "is not a camera's"),
+            (1 << 40, 1 << 40, 400.0, "is not a camera's"),
+            (1, 1 << 26, 400.0, "no camera's shape"),
+            (1 << 20, 16, 400.0, "no camera's shape"),
+            (640, 480, f64::INFINITY, "focal lengths"),
+            (640, 480, 1e9, "focal lengths"),
+            (640, 480, f64::NAN, "focal lengths"),
+        ] {
+            let fault = Optics::pinhole(width, height, [focal, focal, 1.0, 1.0]).fault().unwrap_or_default();
+            assert!(fault.contains(word) && fault.is_empty() == word.is_empty(), "{word}: {fault}");
+        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Hands, contact and narrations of the result.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Matrix3;
 
@@ -198,14 +198,19 @@ pub(super) fn clips(captures: &[Capture], timeline: &Timeline, report: &mut Repo
     let Some(index) = captures.iter().position(|c| !c.clips.is_empty()) else { return Vec::new() };
     let source = &captures[index];
     let mut out: Vec<Clip> = Vec::new();
+    let mut taken = BTreeSet::new();
     let mut by = By::Nothing;
     for (i, clip) in source.clips.iter().enumerate() {
         let Some((start, end, how)) = span(timeline, &clip.start, &clip.end) else { continue };
         by = how;
-        let name = if clip.name.is_empty() { format!("clip_{i:03}") } else { clip.name.clone() };
-        let is_taken = out.iter().any(|c| c.clip == name);
+        let wanted = if clip.name.is_empty() { format!("clip_{i:03}") } else { clip.name.clone() };
+        let (mut name, mut number) = (wanted.clone(), i);
+        while !taken.insert(name.clone()) {
+            name = format!("{wanted}_{number}");
+            number += 1;
+        }
         out.push(Clip {
-            clip: if is_taken { format!("{name}_{i}") } else { name },
+            clip: name,
             start_frame: start,
             end_frame: end,
             narration: clip.narration.clone(),

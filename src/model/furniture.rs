@@ -44,7 +44,7 @@ pub fn to_ruled_twin(model: &Model) -> (Twin, ContactRules, Vec<String>) {
     let tree = match model.tree() {
         Ok(tree) => tree,
         Err(faults) => {
-            let reason = faults.join("; ");
+            let reason = few(&faults);
             twin.left_out =
                 model.moving().map(|(_, j)| LeftOut { id: j.name.clone(), reason: reason.clone() }).collect();
             notes.push(format!("the links are no tree: {reason}"));
@@ -93,6 +93,13 @@ pub fn to_ruled_twin(model: &Model) -> (Twin, ContactRules, Vec<String>) {
     let contacts = Contacts::of(model, &tree);
     let rules = ContactRules { solids: names.solids, excluded: contacts.excluded_pairs(), family: contacts.families() };
     (twin, rules, notes)
+}
+
+/// The first faults in one text: every joint gets it as its reason.
+fn few(faults: &[String]) -> String {
+    const MOST: usize = 5;
+    let shown = faults.get(..MOST).unwrap_or(faults).join("; ");
+    if faults.len() > MOST { format!("{shown}; and {} more", faults.len() - MOST) } else { shown }
 }
 
 /// Frames, and links between two joints of one body, weigh nothing.

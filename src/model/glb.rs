@@ -135,13 +135,13 @@ pub fn read(path: &Path) -> Result<Scene> {
                 ));
                 continue;
             }
-            let keys = keys(&file, animation, channel, path);
-            let keys = keys.and_then(|k| match left.checked_sub(k.times.len()) {
-                Some(rest) => {
-                    left = rest;
-                    Ok(k)
-                }
-                None => Err(Why::NotRead("there are too many keyframes".to_owned())),
+            let too_many = || Why::NotRead("there are too many keyframes".to_owned());
+            // Once there are too many, none is looked at any more: channels may share their numbers.
+            let keys = if left > 0 { keys(&file, animation, channel, path) } else { Err(too_many()) };
+            let keys = keys.and_then(|k| {
+                let rest = left.checked_sub(k.times.len());
+                left = rest.unwrap_or(0);
+                rest.map(|_| k).ok_or_else(too_many)
             });
             match keys {
                 Ok(keys) => {

@@ -31,6 +31,9 @@ pub const WORLD: &str = "world";
 /// Elements of a body that make joints or shapes of their own.
 const HIDING: [&str; 3] = ["attach", "composite", "flexcomp"];
 
+/// Pairs that are excluded from contacts: copies by `<replicate>` multiply them, and no model of furniture has as many.
+const MAX_EXCLUDES: usize = 1_000_000;
+
 /// Reads a file with everything that it includes, wherever that lies.
 ///
 /// # Errors
@@ -187,6 +190,10 @@ impl Builder {
         let both = |a: &str, b: &str| element.get(a).zip(element.get(b)).map(|(a, b)| (copies.of(a), copies.of(b)));
         match (element.name.as_str(), both("body1", "body2"), both("geom1", "geom2")) {
             ("exclude", Some((first, second)), _) => {
+                let pairs = first.len().saturating_mul(second.len());
+                if self.model.excludes.len().saturating_add(pairs) > MAX_EXCLUDES {
+                    return self.pass_over("exclude");
+                }
                 for a in &first {
                     self.model.excludes.extend(second.iter().map(|b| [a.clone(), b.clone()]));
                 }

@@ -12,8 +12,17 @@ use crate::math::{Point, Pose, Vector, rotation, unit};
 
 const MAX_CLASSES: usize = 10_000;
 
+/// Of all classes together: each holds what it inherits, so that a few would fill the memory.
+const MAX_CLASS_BYTES: usize = 64 << 20;
+
 /// Attributes that a class gives to elements: tag, then attribute, then value.
 pub(super) type Class = BTreeMap<String, BTreeMap<String, String>>;
+
+/// What a class takes in memory, about: its texts, and as much again as two of them take for themselves.
+fn bytes(class: &Class) -> usize {
+    let attributes = class.values().flatten();
+    attributes.map(|(key, value)| key.len() + value.len() + 2 * size_of::<String>()).sum()
+}
 
 /// What holds for the whole file.
 pub(super) struct Context {
@@ -30,6 +39,8 @@ pub(super) struct Context {
     /// What all bodies are scaled to weigh together, kg.
     pub(super) total: Option<f64>,
     pub(super) classes: BTreeMap<String, Class>,
+    /// Bytes of all classes, about.
+    class_bytes: usize,
     /// By name.
     pub(super) meshes: BTreeMap<String, Mesh>,
 }
@@ -46,6 +57,7 @@ impl Context {
             bounded: false,
             total: None,
             classes: BTreeMap::from([(MAIN.to_owned(), Class::new())]),
+            class_bytes: 0,
             meshes: BTreeMap::new(),
         };
         for compiler in root.all("compiler") {
@@ -126,6 +138,10 @@ impl Context {
         let mut class = self.classes.get(parent).cloned().unwrap_or_default();
         for setting in element.children.iter().filter(|c| c.name != "default") {
             class.entry(setting.name.clone()).or_default().extend(setting.attributes.iter().cloned());
+        }
+        self.class_bytes = self.class_bytes.saturating_add(bytes(&class));
+        if self.class_bytes > MAX_CLASS_BYTES {
+            return Err(element.error(format!("the default classes take more than {} MiB", MAX_CLASS_BYTES >> 20)));
         }
         self.classes.insert(name.to_owned(), class);
         for nested in element.all("default") {

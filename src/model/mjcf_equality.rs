@@ -20,12 +20,18 @@ pub(super) fn read(c: &Context, root: &Element, model: &mut Model) {
         .any(|f| ["equality", "constraint"].iter().any(|w| f.get(w) == Some("disable")));
     // Without a tree nothing is rigidly connected; that is a fault of its own.
     let Ok(tree) = model.tree() else { return };
+    let mut children: Vec<Option<usize>> = vec![None; model.joints.len()];
+    for (link, carrier) in tree.carrier.iter().enumerate() {
+        if let Some(slot) = carrier.and_then(|joint| children.get_mut(joint)) {
+            *slot = Some(link);
+        }
+    }
     let mut others: BTreeMap<String, usize> = BTreeMap::new();
     for element in root.all("equality").flat_map(|e| &e.children) {
         if switched_off || !is_active(c, element) {
             continue;
         }
-        match held(element, model, &tree) {
+        match held(element, model, &tree, &children) {
             Some(held) => {
                 let at = place(&model.source, element);
                 let fault = format!(
@@ -48,8 +54,8 @@ fn is_active(c: &Context, element: &Element) -> bool {
     active != Some("false")
 }
 
-/// The joint that a constraint holds, by name.
-fn held(element: &Element, model: &Model, tree: &Tree) -> Option<String> {
+/// The joint that a constraint holds, by name; `children` are the links that the joints move.
+fn held(element: &Element, model: &Model, tree: &Tree, children: &[Option<usize>]) -> Option<String> {
     if element.name == "joint" {
         let name = element.get("joint1")?;
         // The position, or how it follows the other's: a polynomial, by default the same.
@@ -64,7 +70,7 @@ fn held(element: &Element, model: &Model, tree: &Tree) -> Option<String> {
     }
     let (first, second) = ends(element, model)?;
     for (index, joint) in model.moving() {
-        let Some(child) = tree.carrier.iter().position(|carrier| *carrier == Some(index)) else { continue };
+        let Some(child) = children.get(index).copied().flatten() else { continue };
         let Some(parent) = tree.parent[child] else { continue };
         let bodies = (tree.body[first.link], tree.body[second.link]);
         let (moved, still) = (tree.body[child], tree.body[parent]);

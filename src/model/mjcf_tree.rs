@@ -12,7 +12,7 @@ use crate::math::Vector;
 
 /// Nobody nests deeper; loops end sooner, as no file is included twice.
 const MAX_INCLUDES: usize = 32;
-/// As many as a file may have itself.
+/// Elements and attributes; of elements alone, as many as a file may have itself.
 const MAX_COPIES: usize = 1_000_000;
 
 /// Files that other files include. They are read wherever MuJoCo reads them, folders above the model's included.
@@ -86,12 +86,19 @@ impl Copies {
         Ok(())
     }
 
-    /// What a name has become: the names of its copies, else itself.
+    /// What a name has become: the names of its copies, else itself. Each once, however often a file gives one name.
     pub(super) fn of(&self, name: &str) -> Vec<String> {
-        match self.names.get(name) {
-            Some(copies) => copies.iter().flat_map(|n| self.of(n)).collect(),
-            None => vec![name.to_owned()],
+        let (mut out, mut seen, mut open) = (Vec::new(), BTreeSet::new(), vec![name]);
+        while let Some(name) = open.pop() {
+            if !seen.insert(name) {
+                continue;
+            }
+            match self.names.get(name) {
+                Some(copies) => open.extend(copies.iter().rev().map(String::as_str)),
+                None => out.push(name.to_owned()),
+            }
         }
+        out
     }
 
     /// Whether something of this name was copied.
@@ -107,7 +114,7 @@ impl Copies {
         let count = if count >= 1.0 { count.min(MAX_COPIES as f64) as usize } else { 0 };
         self.elements = self.elements.saturating_add(count.saturating_mul(size(replicate)));
         if self.elements > MAX_COPIES {
-            return Err(replicate.error(format!("makes more than {MAX_COPIES} elements")));
+            return Err(replicate.error(format!("makes more than {MAX_COPIES} elements and attributes")));
         }
         let separator = replicate.get("sep").unwrap_or_default();
         let digits = count.to_string().len();
@@ -136,9 +143,10 @@ impl Copies {
     }
 }
 
-/// How many elements there are in one, itself included.
+/// What a copy of an element costs, itself included: its elements and attributes, long ones (64 bytes each) counting more.
 fn size(element: &Element) -> usize {
-    element.children.iter().map(size).fold(1, usize::saturating_add)
+    let own: usize = element.attributes.iter().map(|(key, value)| 1 + (key.len() + value.len()) / 64).sum();
+    element.children.iter().map(size).fold(1 + own, usize::saturating_add)
 }
 
 fn names_in(element: &Element, names: &mut BTreeSet<String>) {
@@ -154,4 +162,25 @@ fn rename(element: &mut Element, names: &BTreeSet<String>, suffix: &str) {
         }
     }
     element.children.iter_mut().for_each(|c| rename(c, names, suffix));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_many_copies_share_are_followed_once() {
+        let name = |depth: usize| format!("a{}", "0".repeat(depth));
+        let names = (0..40).map(|depth| (name(depth), vec![name(depth + 1); 9])).collect();
+        let copies = Copies { names, elements: 0 };
+        assert_eq!(copies.of("a"), [name(40)]);
+        assert_eq!(copies.of("b"), ["b"]);
+    }
+
+    #[test]
+    fn attributes_and_long_values_count_where_copies_are_made() {
+        let text = format!("<mujoco><geom a='1' b='{}'/></mujoco>", "x".repeat(6400));
+        let root = xml::parse(Path::new("m.xml"), &text).unwrap();
+        assert_eq!(size(&root), 1 + 1 + 1 + 101);
+    }
 }

@@ -14,6 +14,29 @@ const SPLAT_RADIUS_M: f64 = 0.025;
 /// A decoder may claim any size; a 1408 x 1408 RGB frame needs 6 MB.
 const MAX_IMAGE_BYTES: u64 = 1 << 30;
 
+/// More pixels than any camera here has.
+const MAX_PIXELS: u64 = 64 << 20;
+
+/// Decoded bytes that one byte of a file can stand for: deflate makes at most 1032 of one, pixels of one bit that become
+/// three bytes 24 times as many, and JPEG less.
+const MOST_OF_A_BYTE: u64 = 32 << 10;
+
+/// Whether a file of so many bytes can hold what its header claims; `Err` says in words why not. To be asked before anything
+/// of that size is made.
+///
+/// # Errors
+/// Where the image is larger than any camera's, or the file is too short for it.
+pub fn believable(decoder: &impl ImageDecoder, file_bytes: u64) -> std::result::Result<(), String> {
+    let (width, height) = decoder.dimensions();
+    if u64::from(width) * u64::from(height) > MAX_PIXELS {
+        return Err(format!("claims {width} x {height} pixels, more than any camera has"));
+    }
+    if decoder.total_bytes() > file_bytes.saturating_mul(MOST_OF_A_BYTE) {
+        return Err(format!("claims {width} x {height} pixels, too many for its {file_bytes} bytes; is it cut off?"));
+    }
+    Ok(())
+}
+
 fn decode(path: &Path, camera: &Camera) -> Result<DynamicImage> {
     let mut reader =
         ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(|e| Error::io(path, &e))?;
@@ -36,6 +59,8 @@ fn decode(path: &Path, camera: &Camera) -> Result<DynamicImage> {
             ),
         ));
     }
+    let file_bytes = std::fs::metadata(path).map_err(|e| Error::io(path, &e))?.len();
+    believable(&decoder, file_bytes).map_err(|e| Error::format(path, "image", e))?;
     DynamicImage::from_decoder(decoder).map_err(wrong)
 }
 

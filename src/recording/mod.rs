@@ -8,6 +8,7 @@ mod folder;
 pub mod grid;
 pub mod images;
 pub mod narration;
+pub mod npy;
 mod read;
 mod reconstruction;
 pub mod segments;

@@ -5,6 +5,7 @@ use std::io::BufReader;
 use std::path::Path;
 
 use super::folder::MAX_COORDINATE;
+use super::read::bounded_line;
 use crate::error::{Error, Result};
 use crate::math::Point;
 
@@ -21,11 +22,7 @@ pub(super) fn read(dir: &Path) -> Result<Vec<Point>> {
     let finite: Vec<Point> = points.into_iter().filter(|p| p.coords.iter().all(|x| x.abs() < MAX_COORDINATE)).collect();
     if finite.is_empty() {
         let file = if ply.is_file() { ply } else { obj };
-        return Err(Error::format(
-            &file,
-            "vertices",
-            "no finite points (of an OBJ only vertices in faces count); use PLY",
-        ));
+        return Err(Error::format(&file, "vertices", "no finite points; export the mesh again"));
     }
     Ok(finite)
 }
@@ -83,13 +80,46 @@ fn ply_points(path: &Path) -> Result<Vec<Point>> {
     Ok(vertices.iter().map(|v| Point::from(v.0)).collect())
 }
 
+/// All vertices. Faces, materials and the files that they name are of no use here and are not looked at.
 fn obj_points(path: &Path) -> Result<Vec<Point>> {
-    let options = tobj::LoadOptions { ignore_points: false, ..Default::default() };
-    let (models, _) = tobj::load_obj(path, &options)
-        .map_err(|e| Error::format(path, "obj", format!("cannot be read ({e}); export the mesh again")))?;
-    Ok(models
-        .iter()
-        .flat_map(|m| m.mesh.positions.chunks_exact(3))
-        .map(|c| Point::new(f64::from(c[0]), f64::from(c[1]), f64::from(c[2])))
-        .collect())
+    let file = File::open(path).map_err(|e| Error::io(path, &e))?;
+    let mut reader = BufReader::new(file);
+    let mut out = Vec::new();
+    let mut number = 0;
+    loop {
+        number += 1;
+        let Some(line) = bounded_line(&mut reader, path, number)? else { return Ok(out) };
+        let mut words = line.split_ascii_whitespace();
+        if words.next() != Some("v") {
+            continue;
+        }
+        let mut p = [0.0; 3];
+        for value in &mut p {
+            *value = words.next().and_then(|w| w.parse::<f64>().ok()).ok_or_else(|| {
+                Error::format(path, format!("line {number}"), "expected v and three numbers; export the mesh again")
+            })?;
+        }
+        out.push(Point::from(p));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_obj_is_its_vertices_whatever_its_faces_and_materials_say() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("reconstruction.obj");
+        let faces = "mtllib /dev/zero\nv 1 2 3 0.5 0.5 0.5\r\nvn 0 0 1\nvt 0 0\nv -1 0 2.5\nf 1/-9/9223372036854775807 -9 2//0\n";
+        std::fs::write(&path, faces).unwrap();
+        assert_eq!(read(dir.path()).unwrap(), [Point::new(1.0, 2.0, 3.0), Point::new(-1.0, 0.0, 2.5)]);
+        for (text, word) in
+            [("v 1 2\n", "line 1: expected v"), ("# a\nv 1 x 2\n", "line 2"), ("f 1 2 3\n", "no finite points")]
+        {
+            std::fs::write(&path, text).unwrap();
+            let error = read(dir.path()).unwrap_err().to_string();
+            assert!(error.contains(word) && error.contains("reconstruction.obj"), "{error}");
+        }
+    }
 }

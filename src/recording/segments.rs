@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
+use super::npy;
 use super::read::bounded_line;
 use crate::error::{Error, Result};
 
@@ -36,7 +37,12 @@ fn npz(path: &Path) -> Result<Vec<Ends>> {
     })?;
     // A header may claim any size: no more is read than the largest believable array.
     let limit = (MAX_SEGMENTS * 4 * 8 + 4096) as u64;
-    let array = npyz::NpyFile::new(entry.take(limit)).map_err(|e| wrong(format!("is no numpy array ({e})")))?;
+    let mut bytes = Vec::new();
+    entry.take(limit).read_to_end(&mut bytes).map_err(|e| wrong(format!("cannot be read ({e})")))?;
+    if let Some(why) = npy::refused(&bytes) {
+        return Err(wrong(format!("is no numpy array ({why})")));
+    }
+    let array = npyz::NpyFile::new(bytes.as_slice()).map_err(|e| wrong(format!("is no numpy array ({e})")))?;
     let shape = array.shape().to_vec();
     if shape.first() == Some(&0) {
         return Ok(Vec::new());
@@ -142,6 +148,8 @@ mod tests {
             ("a.npz", npz_of("lines.npy", "<f4", "(3, 4)", &[0; 48]), "shape"),
             ("a.npz", npz_of("lines.npy", "<f8", "(99, 2, 2)", &[0; 8]), "cannot be read"),
             ("a.npz", npz_of("lines.npy", "<f8", "(99999999999, 2, 2)", &[0; 8]), "shape"),
+            ("a.npz", npz_of("lines.npy", "<f8", "(4294967296, 4294967296, 2)", &[0; 8]), "more numbers"),
+            ("a.npz", npz_of("lines.npy", "<f8", &"(".repeat(9000), &[0; 8]), "nests deeper"),
             ("a.txt", b"3\n1 2 3 4\n".to_vec(), "announces 3"),
             ("a.txt", b"1\n1 2 nan 4\n".to_vec(), "finite"),
             ("a.txt", b"1\n1 2 x 4\n".to_vec(), "line 2"),

@@ -10,6 +10,7 @@ mod floors;
 mod foreign;
 mod formats;
 mod honesty;
+mod hostile;
 mod import;
 mod known_truth;
 mod mjcf;
