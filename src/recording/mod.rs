@@ -9,7 +9,7 @@ pub mod grid;
 pub mod images;
 pub mod narration;
 mod read;
-mod reconstruction;
+pub(crate) mod reconstruction;
 pub mod segments;
 pub mod sketch;
 mod sniff;
