@@ -325,8 +325,13 @@ fn span(timeline: &Timeline, start: &At, end: &At) -> Option<(usize, usize, By)>
     };
     let by_index = || {
         let (a, b) = (start.index?, end.index?);
-        let first = frames.iter().position(|f| f.at.index.is_some_and(|i| i >= a));
-        within(By::Index, first, frames.iter().rposition(|f| f.at.index.is_some_and(|i| i <= b)))
+        // A name that ends with a number tells the frame as well.
+        let number = |f: &Draft| {
+            let named = || names::numbered(f.at.name.as_ref()?).and_then(|(_, n)| usize::try_from(n).ok());
+            f.at.index.or_else(named)
+        };
+        let first = frames.iter().position(|f| number(f).is_some_and(|i| i >= a));
+        within(By::Index, first, frames.iter().rposition(|f| number(f).is_some_and(|i| i <= b)))
     };
     let by_name = || {
         let (a, b) = (names::numbered(start.name.as_ref()?)?, names::numbered(end.name.as_ref()?)?);

@@ -110,10 +110,17 @@ fn table(path: &Path) -> Result<Vec<(String, Row)>> {
     Ok(out)
 }
 
-/// One object a line, or a list of them.
+/// One object a line, or a list of them, which may stand in an object.
 fn objects(path: &Path) -> Result<Vec<(String, Row)>> {
-    if head(path, 64).trim_start_matches('\u{feff}').trim_start().starts_with('[') {
-        let list: Vec<Value> = crate::json::read(path)?;
+    if ending(path) == "json" {
+        let value: Value = crate::json::read(path)?;
+        let list = match &value {
+            Value::Object(object) => object.values().find_map(Value::as_array),
+            other => other.as_array(),
+        };
+        let Some(list) = list else {
+            return Err(Error::format(path, "the whole file", "holds no list of narrations"));
+        };
         return Ok(list.iter().enumerate().map(|(i, v)| (format!("entry {}", i + 1), cells_of(v))).collect());
     }
     let mut lines = Lines::open(path)?;
