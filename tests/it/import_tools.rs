@@ -66,7 +66,7 @@ fn write_arkitscenes(root: &Path) -> Vec<Pose> {
         let name = format!("41069021_{time:.3}.png");
         let inverse = frame.world_from_camera.inverse();
         let (r, t) = (inverse.rotation.scaled_axis(), inverse.translation.vector);
-        writeln!(trajectory, "{time} {} {} {} {} {} {}", r.x, r.y, r.z, t.x, t.y, t.z).unwrap();
+        writeln!(trajectory, "{time:.3} {} {} {} {} {} {}", r.x, r.y, r.z, t.x, t.y, t.z).unwrap();
         let image = image::open(still("frames", i)).unwrap();
         std::fs::create_dir_all(root.join("lowres_wide")).unwrap();
         image.save(root.join("lowres_wide").join(&name)).unwrap();
@@ -145,7 +145,8 @@ fn arti4d_comes_back_whether_images_were_turned_or_not() {
         import(&[root.to_str().unwrap(), "--fps", "0"], dir.path());
         let out = dir.path().join("out");
         let (m, deg) = apart(&truth, &poses(&out));
-        assert!(m < 1e-6 && deg < 1e-4, "{is_turned}: {m} m, {deg} degrees");
+        // Doubles of seconds since 1970 are a quarter of a microsecond apart.
+        assert!(m < 1e-5 && deg < 1e-3, "{is_turned}: {m} m, {deg} degrees");
         assert_eq!(depth_mm(&out.join("depth/000003.png")), depth_mm(&still("depth", 3)));
         let clips = read_json(&out.join("clips.json"));
         assert_eq!((&clips["clips"][0]["start_frame"], &clips["clips"][0]["end_frame"]), (&json!(3), &json!(9)));
@@ -283,7 +284,7 @@ fn poses_depth_hands_contact_and_words_of_five_sources_make_one_recording() {
     let out = dir.path().join("out");
     let report = read_json(&out.join("import.json"));
     let scale = report["scale"]["metres_per_unit"].as_f64().unwrap();
-    assert!((scale / 2.5 - 1.0).abs() < 0.01, "{scale}");
+    assert!((scale / 2.5 - 1.0).abs() < 0.02, "{scale}");
     for (stream, by) in
         [("poses", "name"), ("depth", "name"), ("hands", "name"), ("contact", "name"), ("clips", "name")]
     {
@@ -393,7 +394,7 @@ fn wilors_hands_go_where_the_cameras_own_focal_length_has_them() {
         for (k, tip) in tips.iter().enumerate() {
             let number = |i: usize| row[5 + 3 * k + i].parse::<f64>().unwrap();
             let seen = cameras[*frame].inverse() * Point::new(number(0), number(1), number(2));
-            assert!((seen - tip).norm() < 2e-3, "frame {frame}: {seen} {tip}");
+            assert!((seen - tip).norm() < 1e-6, "frame {frame}: {seen} {tip}");
         }
     }
 }
@@ -404,7 +405,7 @@ fn masks_and_segments_come_by_the_images_names() {
     write_colmap(&dir.path().join("work"), false, 1.0);
     let c = small().camera;
     let total = (c.width * c.height) as u64;
-    // The first 40 columns, as numbers and, in another image, as COCO's text of 6 rows and 5 columns of another shape.
+    // The first 40 columns; in another image by runs that are one pixel too long.
     let column = |class: &str| {
         json!({"image_path": "work/images/000004.jpg", "annotations": [
             {"class_name": class, "bbox": [0, 0, 1, 1], "score": [0.8],
@@ -412,7 +413,10 @@ fn masks_and_segments_come_by_the_images_names() {
             "box_format": "xyxy", "img_width": c.width, "img_height": c.height})
     };
     write(&dir.path().join("sam/000004_results.json"), column("drawer.").to_string());
-    write(&dir.path().join("sam/000005_results.json"), column("drawer").to_string().replace("[0,", "[1,"));
+    write(
+        &dir.path().join("sam/000005_results.json"),
+        column("drawer").to_string().replace("[0,", "[1,").replace("000004", "000005"),
+    );
     write(&dir.path().join("limap/segments/segments_7.txt"), "2\n10 20 30 40\n5.5 6.5 7.5 8.5\n");
     write(&dir.path().join("limap/image_list.txt"), "number of images, 1\n7, images/000004.jpg\n");
     let text = import(&["work", "sam", "limap", "--fps", "0", "--scale", "1", "--up", "z"], dir.path());
@@ -442,7 +446,7 @@ fn a_cloud_gives_a_world_without_points_its_scale() {
     let text = import(&["P01_01.json", "P01_01", "moge", "scan.csv"], dir.path());
     let report = read_json(&dir.path().join("out/import.json"));
     let scale = report["scale"]["metres_per_unit"].as_f64().unwrap();
-    assert!((scale / 2.0 - 1.0).abs() < 0.01, "{scale}");
+    assert!((scale / 2.0 - 1.0).abs() < 0.02, "{scale}");
     assert!(dir.path().join("out/reconstruction.ply").is_file());
     assert!(report["changes"].to_string().contains("are taken to be in the world of"), "{text}");
 }

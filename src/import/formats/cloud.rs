@@ -234,7 +234,7 @@ fn buffers(path: &Path, file: &gltf::Gltf) -> Result<Vec<Vec<u8>>> {
                 Some((_, data)) => base64::engine::general_purpose::STANDARD
                     .decode(data)
                     .map_err(|e| Error::format(path, place.as_str(), format!("is no base64 ({e})")))?,
-                None => match inside(&folder, uri)? {
+                None => match inside(&folder, uri).map_err(|e| Error::format(path, place.as_str(), e.to_string()))? {
                     Some(found) => Blob::File(found).read()?,
                     None => {
                         let name: String = uri.chars().take(80).collect();

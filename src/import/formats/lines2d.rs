@@ -49,7 +49,7 @@ pub(super) fn read_deeplsd(path: &Path, _options: &Options) -> Result<Capture> {
 pub(super) fn read_limap(path: &Path, _options: &Options) -> Result<Capture> {
     let names = image_list(path)?;
     let found = limap(path).into_iter().filter_map(|file| {
-        let (_, number) = numbered(&stem(&file)).map(|(head, n)| (head.to_owned(), n))?;
+        let number = numbered(&stem(&file))?.1;
         let at = match &names {
             Some(names) => At::name(names.get(&number)?),
             None => At::index(number as usize),
@@ -98,4 +98,43 @@ fn image_list(path: &Path) -> Result<Option<BTreeMap<u64, String>>> {
         }
     }
     Ok(Some(out))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write as _;
+
+    /// DeepLSD's exporter: an array `lines` of shape (1, 2, 2), rows before columns.
+    fn npz() -> Vec<u8> {
+        let mut header = "{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2, 2), }".to_owned();
+        while (10 + header.len() + 1) % 64 != 0 {
+            header.push(' ');
+        }
+        header.push('\n');
+        let mut npy = b"\x93NUMPY\x01\x00".to_vec();
+        npy.extend((header.len() as u16).to_le_bytes());
+        npy.extend(header.as_bytes());
+        npy.extend([10f32, 20.0, 30.0, 40.0].iter().flat_map(|v| v.to_le_bytes()));
+        let mut zip = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+        let options = zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
+        zip.start_file("lines.npy", options).unwrap();
+        zip.write_all(&npy).unwrap();
+        zip.finish().unwrap().into_inner()
+    }
+
+    #[test]
+    fn deeplsds_files_are_named_after_their_images_and_a_bad_one_costs_itself() {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join("000003_deeplsd.npz"), npz()).unwrap();
+        std::fs::write(dir.path().join("000004_deeplsd_ext.npz"), &npz()[..40]).unwrap();
+        assert!(detect_deeplsd(dir.path()) && !detect_limap(dir.path()));
+        let capture = read_deeplsd(dir.path(), &Options::default()).unwrap();
+        assert_eq!(capture.segments.len(), 1);
+        assert_eq!(capture.segments[0].at.name.as_deref(), Some("000003"));
+        assert_eq!(capture.segments[0].segments, [[[20.0, 10.0], [40.0, 30.0]]]);
+        assert!(capture.notes[0].contains("000004_deeplsd_ext.npz"), "{:?}", capture.notes);
+        std::fs::remove_file(dir.path().join("000003_deeplsd.npz")).unwrap();
+        assert!(read_deeplsd(dir.path(), &Options::default()).is_err());
+    }
 }

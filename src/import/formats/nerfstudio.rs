@@ -6,7 +6,7 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
+use serde_json::Value;
 
 use super::cloud;
 use crate::error::{Error, Result};
@@ -22,27 +22,8 @@ use crate::import::optics::{Lens, Optics, from_corner};
 /// Endings that Blender's sets leave out.
 const ENDINGS: [&str; 4] = ["", ".png", ".jpg", ".jpeg"];
 
-#[derive(Deserialize)]
-struct File {
-    #[serde(flatten)]
-    camera: Intrinsics,
-    frames: Vec<Frame>,
-    ply_file_path: Option<String>,
-    /// Counts of depth times this are metres.
-    depth_unit_scale_factor: Option<f64>,
-}
-
-#[derive(Deserialize)]
-struct Frame {
-    file_path: String,
-    transform_matrix: Vec<Vec<f64>>,
-    depth_file_path: Option<String>,
-    #[serde(flatten)]
-    camera: Intrinsics,
-}
-
 /// Intrinsics as far as they are there.
-#[derive(Deserialize, Clone, Default)]
+#[derive(Clone, Default)]
 struct Intrinsics {
     camera_model: Option<String>,
     is_fisheye: Option<bool>,
@@ -72,40 +53,38 @@ pub(super) fn detect(path: &Path) -> bool {
 
 pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
     let file = file(path);
-    let mut content: File = crate::json::read(&file)?;
+    let content: Value = crate::json::read(&file)?;
     let root = file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
-    if content.frames.is_empty() {
-        return Err(Error::format(&file, "frames", "there is none; nothing to import"));
-    }
-    content.frames.sort_by(|a, b| a.file_path.cmp(&b.file_path));
+    let of_all = Intrinsics::of(&content).map_err(|e| Error::format(&file, "intrinsics", e))?;
+    let frames = frames(&content, &file)?;
     let (mut items, mut images, mut depth) = (Vec::new(), Vec::new(), Vec::new());
-    for frame in &content.frames {
-        let place = || format!("frame {}", frame.file_path.chars().take(80).collect::<String>());
-        let found = image(root, &frame.file_path)?;
-        let optics = frame
-            .camera
-            .over(&content.camera)
-            .optics(found.as_deref())
-            .map_err(|e| Error::format(&file, place(), e))?;
-        let pose = matrix(&frame.transform_matrix)
-            .ok_or_else(|| Error::format(&file, place(), "transform_matrix must be 4 rows of 4 finite numbers"))?;
-        let at = At::name(&frame.file_path);
+    for (name, frame) in &frames {
+        let fault = |message: String| {
+            Error::format(&file, format!("frame {}", name.chars().take(80).collect::<String>()), message)
+        };
+        let found = image(root, name)?;
+        let own = Intrinsics::of(frame).map_err(fault)?;
+        let optics = own.over(&of_all).optics(found.as_deref()).map_err(fault)?;
+        let Some(pose) = frame.get("transform_matrix").and_then(matrix) else {
+            return Err(fault("transform_matrix must be 4 rows of 4 finite numbers".to_owned()));
+        };
+        let at = At::name(name);
         items.push(PoseAt { at: at.clone(), pose, optics });
         if let Some(found) = found {
             images.push(ImageAt { at: at.clone(), picture: Picture::Still(Blob::File(found)), optics });
         }
-        if let Some(name) = &frame.depth_file_path
+        if let Some(name) = frame.get("depth_file_path").and_then(Value::as_str)
             && let Some(found) = inside(root, name)?
         {
             depth.push(DepthAt { at, blob: Blob::File(found), confidence: None, optics: None, pose: None });
         }
     }
-    let points = match &content.ply_file_path {
+    let points = match content.get("ply_file_path").and_then(Value::as_str) {
         Some(name) => inside(root, name)?.map(|p| cloud::points(&p)).transpose()?.unwrap_or_default(),
         None => Vec::new(),
     };
     let has_depth = !depth.is_empty();
-    let unit_m = content.depth_unit_scale_factor.unwrap_or(1e-3);
+    let unit_m = content.get("depth_unit_scale_factor").and_then(Value::as_f64).unwrap_or(1e-3);
     if !(unit_m.is_finite() && unit_m > 0.0) {
         return Err(Error::format(
             &file,
@@ -118,7 +97,7 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         why: "none of the images that transforms.json names lies beside it".to_owned(),
         command: "paws import transforms.json IMAGES --out DIR".to_owned(),
     });
-    let all = content.frames.len();
+    let all = frames.len();
     let mut notes = Vec::new();
     if !images.is_empty() && images.len() < all {
         notes.push(format!("{} of {all} images that transforms.json names are not there", all - images.len()));
@@ -166,9 +145,33 @@ fn image(root: &Path, name: &str) -> Result<Option<PathBuf>> {
     Ok(None)
 }
 
-fn matrix(rows: &[Vec<f64>]) -> Option<RawPose> {
-    let is_whole = (3..=4).contains(&rows.len()) && rows.iter().all(|r| r.len() == 4);
-    let numbers: Vec<f64> = rows.iter().flatten().copied().collect();
+/// Frames by the names of their images.
+fn frames<'a>(content: &'a Value, file: &Path) -> Result<Vec<(&'a str, &'a Value)>> {
+    let Some(list) = content.get("frames").and_then(Value::as_array).filter(|l| !l.is_empty()) else {
+        return Err(Error::format(file, "frames", "must be a list of images with their poses, and holds none"));
+    };
+    let mut out = Vec::with_capacity(list.len());
+    for (i, frame) in list.iter().enumerate() {
+        let Some(name) = frame.get("file_path").and_then(Value::as_str) else {
+            return Err(Error::format(file, format!("frames[{i}]"), "file_path, the image's name, is not there"));
+        };
+        out.push((name, frame));
+    }
+    out.sort_by(|a, b| a.0.cmp(b.0));
+    Ok(out)
+}
+
+fn matrix(rows: &Value) -> Option<RawPose> {
+    let rows = rows.as_array()?;
+    let mut numbers = Vec::new();
+    let mut is_whole = (3..=4).contains(&rows.len());
+    for row in rows {
+        let row = row.as_array()?;
+        is_whole &= row.len() == 4;
+        for value in row {
+            numbers.push(value.as_f64()?);
+        }
+    }
     if !is_whole || numbers.iter().any(|x| !x.is_finite()) {
         return None;
     }
@@ -176,6 +179,32 @@ fn matrix(rows: &[Vec<f64>]) -> Option<RawPose> {
 }
 
 impl Intrinsics {
+    /// Those that stand in an object.
+    fn of(value: &Value) -> std::result::Result<Self, String> {
+        let given = |key: &str| value.get(key).filter(|v| !v.is_null());
+        let number = |key: &str| match given(key) {
+            None => Ok(None),
+            Some(v) => v.as_f64().map(Some).ok_or_else(|| format!("{key} must be a number")),
+        };
+        Ok(Self {
+            camera_model: given("camera_model").and_then(Value::as_str).map(str::to_owned),
+            is_fisheye: given("is_fisheye").and_then(Value::as_bool),
+            w: number("w")?,
+            h: number("h")?,
+            fl_x: number("fl_x")?,
+            fl_y: number("fl_y")?,
+            cx: number("cx")?,
+            cy: number("cy")?,
+            camera_angle_x: number("camera_angle_x")?,
+            k1: number("k1")?,
+            k2: number("k2")?,
+            k3: number("k3")?,
+            k4: number("k4")?,
+            p1: number("p1")?,
+            p2: number("p2")?,
+        })
+    }
+
     /// These, and what they lack from others.
     fn over(&self, other: &Self) -> Self {
         Self {
@@ -243,7 +272,7 @@ mod tests {
     use super::*;
 
     fn intrinsics(text: &str) -> Intrinsics {
-        serde_json::from_str(text).unwrap()
+        Intrinsics::of(&serde_json::from_str(text).unwrap()).unwrap()
     }
 
     #[test]
@@ -263,10 +292,16 @@ mod tests {
 
     #[test]
     fn matrices_are_whole_or_none() {
-        let row = || vec![1.0, 0.0, 0.0, 2.0];
-        assert!(matrix(&[row(), row(), row()]).is_some());
-        assert!(matrix(&[row(), row()]).is_none());
-        assert!(matrix(&[row(), row(), vec![1.0]]).is_none());
-        assert!(matrix(&[row(), row(), vec![0.0, 0.0, f64::INFINITY, 0.0]]).is_none());
+        let read = |text: &str| matrix(&serde_json::from_str(text).unwrap());
+        assert!(read("[[1, 0, 0, 2], [0, 1, 0, 2], [0, 0, 1, 2]]").is_some());
+        for text in [
+            "[[1, 0, 0, 2], [0, 1, 0, 2]]",
+            "[[1, 0, 0, 2], [0, 1, 0, 2], [0, 0, 1]]",
+            "[[1, 0, 0, 2], [0, 1, 0, 2], [0, 0, \"1\", 2]]",
+            "3",
+        ] {
+            assert!(read(text).is_none(), "{text}");
+        }
+        assert!(Intrinsics::of(&serde_json::json!({"fl_x": "wide"})).err().unwrap().contains("fl_x"));
     }
 }
