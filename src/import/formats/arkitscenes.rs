@@ -21,11 +21,19 @@ const LEAST_CONFIDENCE: u8 = 1;
 /// Names are rounded to milliseconds, and not everywhere the same way.
 const SAME_SECS: f64 = 0.0021;
 
-pub(super) fn detect(path: &Path) -> bool {
-    path.join("lowres_wide.traj").is_file() && path.join("lowres_wide").is_dir()
+/// The folder with the streams: the path itself, or `{scan}_frames` in it.
+fn root(path: &Path) -> PathBuf {
+    let inner = path.join(format!("{}_frames", last(path)));
+    if inner.join("lowres_wide.traj").is_file() { inner } else { path.to_owned() }
 }
 
-pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
+pub(super) fn detect(path: &Path) -> bool {
+    let root = root(path);
+    root.join("lowres_wide.traj").is_file() && ["lowres_wide", "lowres_depth"].iter().any(|f| root.join(f).is_dir())
+}
+
+pub(super) fn read(source: &Path, _options: &Options) -> Result<Capture> {
+    let path = &root(source);
     let poses = trajectory(&path.join("lowres_wide.traj"))?;
     let intrinsics = timed(&path.join("lowres_wide_intrinsics"), "pincam");
     let mut images = Vec::new();
@@ -35,6 +43,10 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         optics = optics.or(own);
         let at = At::time(time).with_name(&last(&file));
         images.push(ImageAt { at, picture: Picture::Still(Blob::File(file)), optics: own });
+    }
+    // Depth has the size of these images, so that their camera is known without them.
+    if let (None, Some((_, file))) = (optics, intrinsics.first()) {
+        optics = Some(pincam(file)?);
     }
     let mut depth = Vec::new();
     for (time, file) in timed(&path.join("lowres_depth"), "png") {
@@ -50,7 +62,7 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
     }
     Ok(Capture {
         kind: "arkitscenes".to_owned(),
-        source: path.to_owned(),
+        source: source.to_owned(),
         title: "ARKitScenes scan".to_owned(),
         licence: Some("CC BY-NC-SA 4.0 (Apple)".to_owned()),
         notes,
@@ -105,7 +117,7 @@ fn pincam(path: &Path) -> Result<Optics> {
     let Some(line) = lines.content()? else {
         return Err(lines.fault("is empty; expected width height fx fy cx cy"));
     };
-    let [width, height, fx, fy, cx, cy] = numbers(&lines, &line, "width height fx fy cx cy")?;
+    let [width, height, fx, fy, cx, cy] = numbers::<6>(&lines, &line, "width height fx fy cx cy")?;
     let optics = Optics::pinhole(width.max(0.0) as usize, height.max(0.0) as usize, [fx, fy, cx, cy]);
     optics.fault().map_or(Ok(optics), |fault| Err(lines.fault(fault)))
 }
@@ -114,7 +126,7 @@ fn trajectory(path: &Path) -> Result<Vec<PoseAt>> {
     let mut lines = Lines::open(path)?;
     let mut out = Vec::new();
     while let Some(line) = lines.content()? {
-        let [t, a, b, c, x, y, z] = numbers(&lines, &line, "t, an axis times an angle, x y z")?;
+        let [t, a, b, c, x, y, z] = numbers::<7>(&lines, &line, "t, an axis times an angle, x y z")?;
         let pose = RawPose { position: [x, y, z], turn: Turn::AxisAngle([a, b, c]) };
         out.push(PoseAt { at: At::time(t), pose, optics: None });
     }

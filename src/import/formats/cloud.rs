@@ -165,7 +165,7 @@ fn gltf(path: &Path) -> Result<Vec<Point>> {
         if count > MAX_NODES {
             return Err(Error::format(path, "nodes", format!("more than {MAX_NODES}; a node that holds itself?")));
         }
-        let world = parent * Matrix4::from(node.transform().matrix()).map(f64::from);
+        let world = parent * Matrix4::<f32>::from(node.transform().matrix()).map(f64::from);
         for primitive in node.mesh().into_iter().flat_map(|m| m.primitives()) {
             let (vertices, corners) = surface(&primitive, &buffers, &world);
             add(&vertices, &corners, &mut triangles);
