@@ -44,12 +44,20 @@ const TOLD: usize = 3;
 type Row = BTreeMap<String, String>;
 
 pub(super) fn detect(path: &Path) -> bool {
+    if is_pickle(path) {
+        return true;
+    }
     if !path.is_file() || !["csv", "json", "jsonl"].contains(&ending(path).as_str()) {
         return false;
     }
     let start = head(path, 4096).to_ascii_lowercase();
     let has = |names: &[&str]| names.iter().any(|name| has_word(&start, name));
     has(&TEXT) && ((has(&START) && has(&END)) || (has(&START_FRAME) && has(&END_FRAME)))
+}
+
+/// Whether a file is HD-EPIC's table as pandas keeps it. What reads a pickle runs what stands in it, so that is left to the user.
+fn is_pickle(path: &Path) -> bool {
+    path.is_file() && ["pkl", "pickle"].contains(&ending(path).as_str())
 }
 
 /// Whether a text holds a name that no letter, digit or underscore goes on with.
@@ -62,6 +70,11 @@ fn has_word(text: &str, name: &str) -> bool {
 }
 
 pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
+    if is_pickle(path) {
+        let message = "is a pickle, which is not read; write it as JSON lines: python3 -c \"import pandas, sys; \
+                       pandas.read_pickle(sys.argv[1]).to_json('narrations.jsonl', orient='records', lines=True)\" FILE.pkl";
+        return Err(Error::Io { path: path.to_owned(), message: message.to_owned() });
+    }
     let rows = if ending(path) == "csv" { table(path)? } else { objects(path)? };
     let mut capture = Capture {
         kind: "narrations".to_owned(),
@@ -250,6 +263,8 @@ mod tests {
         let error =
             read_text("a.jsonl", "{\"start\": 1, \"end\": 2, \"text\": \"x\"}\n{\"start\"\n").unwrap_err().to_string();
         assert!(error.contains("line 2") && error.contains("no JSON"), "{error}");
+        let error = read_text("HD_EPIC_Narrations.pkl", "").unwrap_err().to_string();
+        assert!(error.contains("JSON lines") && error.contains("read_pickle"), "{error}");
         let error = read_text("a.csv", "start,end,narration\n").unwrap_err().to_string();
         assert!(error.contains("there is none"), "{error}");
     }
