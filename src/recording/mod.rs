@@ -3,8 +3,8 @@
 //! The layout on disk is described in `docs/recording-format.md`.
 
 pub mod at_work;
-mod folder;
 mod columns;
+mod folder;
 pub mod grid;
 pub mod images;
 pub mod narration;

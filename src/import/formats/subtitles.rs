@@ -80,7 +80,9 @@ mod tests {
     fn cues_are_clips_with_plain_words() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.srt");
-        std::fs::write(&path, "1\r\n00:00:01,500 --> 00:00:03,000\r\n<i>open</i>\r\nthe door\r\n\r\n2\r\n00:00:04,000 --> 00:00:05,000\r\n\r\n").unwrap();
+        let text = "1\r\n00:00:01,500 --> 00:00:03,000\r\n<i>open</i>\r\nthe door\r\n\r\n\
+                    2\r\n00:00:04,000 --> 00:00:05,000\r\n\r\n";
+        std::fs::write(&path, text).unwrap();
         let capture = read(&path, &Options::default()).unwrap();
         let [clip] = capture.clips.as_slice() else { panic!("{:?}", capture.clips) };
         assert_eq!((clip.start.time_secs, clip.end.time_secs), (Some(1.5), Some(3.0)));
