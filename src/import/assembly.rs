@@ -2,7 +2,7 @@
 
 use super::axes::Convention;
 use super::imported::{Frame, Imported};
-use super::report::{NEEDED, Report, SourceReport};
+use super::report::{NEEDED, Report, SourceReport, source_name};
 use super::timeline::{self, Timeline};
 use super::view::View;
 use super::{Capture, Options, people, world};
@@ -29,7 +29,7 @@ pub fn assemble(captures: Vec<Capture>, options: &Options) -> Result<Imported> {
     let mut hands = people::hands(&captures, &timeline, &place, options, &mut report);
     people::contacts(&captures, &timeline, &mut hands, &mut report);
     let clips = people::clips(&captures, &timeline, &mut report);
-    let points = points(&captures, &timeline, &place, options);
+    let points = points(&captures, &timeline, &place, options, &mut report);
     let depth_factor = world::depth_factor(&captures, &timeline, &place, options);
     match depth_factor {
         None => report
@@ -85,10 +85,24 @@ pub fn assemble(captures: Vec<Capture>, options: &Options) -> Result<Imported> {
     Ok(imported)
 }
 
-/// Points of the capture with the poses, evenly thinned.
-fn points(captures: &[Capture], timeline: &Timeline, place: &world::Place, options: &Options) -> Vec<Point> {
-    let Some(capture) = captures.get(timeline.posed) else { return Vec::new() };
-    let convention = Convention::of(capture, options);
+/// Points of the capture with the poses, else of the first one that has any, evenly thinned.
+fn points(
+    captures: &[Capture],
+    timeline: &Timeline,
+    place: &world::Place,
+    options: &Options,
+    report: &mut Report,
+) -> Vec<Point> {
+    let Some(posed) = captures.get(timeline.posed) else { return Vec::new() };
+    let Some(capture) = world::with_points(captures, timeline.posed) else { return Vec::new() };
+    if capture.poses.is_none() {
+        report.changes.push(format!(
+            "points of {} are taken to be in the world of {}, in its unit",
+            source_name(capture),
+            source_name(posed)
+        ));
+    }
+    let convention = Convention::of(posed, options);
     let step = capture.points.len().div_ceil(MAX_POINTS).max(1);
     capture
         .points

@@ -357,6 +357,8 @@ pub struct Capture {
     pub world: World,
     /// The colour camera.
     pub optics: Option<Optics>,
+    /// Whether [`Capture::optics`] were guessed from images, so that any other source's come first.
+    pub optics_estimated: bool,
     /// Poses.
     pub poses: Option<Poses>,
     /// Colour images, in any order.
@@ -365,6 +367,9 @@ pub struct Capture {
     pub depth: Option<Depth>,
     /// Hands.
     pub hands: Option<Hands>,
+    /// Focal length that the hands (in the camera's frame) were placed with, as a share of the image's width, its principal
+    /// point the image's middle; `None`: the camera's own. Hands are moved to where the camera's own focal length has them.
+    pub hands_focal_per_width: Option<f64>,
     /// Opinions about contact that come without joints.
     pub contacts: Vec<ContactAt>,
     /// Masks.
@@ -375,7 +380,10 @@ pub struct Capture {
     pub segments: Vec<SegmentsAt>,
     /// Narrations.
     pub clips: Vec<ClipAt>,
-    /// Points of a static reconstruction, the capture's world and unit.
+    /// Name of each narration's video, where one file holds narrations of several; else empty.
+    pub clip_videos: Vec<String>,
+    /// Points of a static reconstruction, the capture's world and unit; of a capture without poses: the world and unit of the
+    /// capture with the poses.
     pub points: Vec<Point>,
     /// What is missing.
     pub missing: Vec<Missing>,

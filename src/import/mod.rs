@@ -20,6 +20,7 @@ pub mod decode;
 pub mod formats;
 pub mod join;
 pub mod joints;
+pub mod names;
 pub mod optics;
 pub mod poses;
 pub mod report;

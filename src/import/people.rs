@@ -6,13 +6,14 @@ use nalgebra::Matrix3;
 
 use super::Options;
 use super::axes::{Convention, camera_matrix};
-use super::capture::{At, Capture, Hands, JointFrame};
+use super::capture::{At, Capture, ClipAt, Hands, JointFrame};
 use super::imported::Hand;
 use super::join::{By, Track, join};
+use super::names;
 use super::report::{Report, Stream, source_name};
 use super::timeline::{Draft, Timeline};
 use super::world::Place;
-use crate::math::{Point, Pose};
+use crate::math::{Point, Pose, Vector, centroid};
 use crate::recording::{Clip, Side};
 
 /// From joints of a file to the result's world.
@@ -28,6 +29,7 @@ struct Bridge<'a> {
     place: &'a Place,
     pose_gap_secs: f64,
     is_one_clock: bool,
+    focal_per_width: Option<f64>,
 }
 
 impl Bridge<'_> {
@@ -42,6 +44,7 @@ impl Bridge<'_> {
         let time = time_secs.filter(|_| self.is_one_clock);
         let world_from_camera =
             time.and_then(|t| self.track.at(t, self.pose_gap_secs)).unwrap_or(frame.world_from_camera);
+        let shift = self.shift(joints, frame);
         let camera_from_joints = match self.frame {
             JointFrame::World => None,
             JointFrame::Camera(axes) => Some((camera_matrix(axes), Pose::identity())),
@@ -57,7 +60,9 @@ impl Bridge<'_> {
         Some(joints.map(|p| {
             let p = Point::from(p?);
             let in_world = match (&camera_from_joints, &other) {
-                (Some((turn, pose)), _) => world_from_camera * (pose * Point::from(turn * p.coords * self.unit_m)),
+                (Some((turn, pose)), _) => {
+                    world_from_camera * (pose * Point::from(turn * p.coords * self.unit_m + shift))
+                }
                 (None, None) => self.own.point(&p),
                 (None, Some(camera_from_own)) => world_from_camera * (camera_from_own * self.own.point(&p)),
             };
@@ -71,6 +76,28 @@ impl Bridge<'_> {
             };
             Some(placed)
         }))
+    }
+}
+
+impl Bridge<'_> {
+    /// What is added to joints in the camera that were placed with another focal length: the hand as a whole goes to where the
+    /// same pixels and the same size have it.
+    fn shift(&self, joints: &[Option<[f64; 3]>; 21], frame: &Draft) -> Vector {
+        let (Some(assumed), JointFrame::Camera(axes)) = (self.focal_per_width, self.frame) else {
+            return Vector::zeros();
+        };
+        let points: Vec<Point> = joints
+            .iter()
+            .flatten()
+            .map(|p| Point::from(camera_matrix(axes) * Vector::from(*p) * self.unit_m))
+            .collect();
+        let Some(middle) = centroid(&points) else { return Vector::zeros() };
+        let o = &frame.optics;
+        let factor = o.fx / (assumed * o.width as f64);
+        let z = middle.z * factor;
+        // Pixels beside the principal point that the assumed camera had in the image's middle.
+        let aside = |size: usize, c: f64, f: f64| (0.5 * (size as f64 - 1.0) - c) / f * z;
+        Vector::new(aside(o.width, o.cx, o.fx), aside(o.height, o.cy, o.fy), z - middle.z)
     }
 }
 
@@ -160,6 +187,7 @@ fn bridge<'a>(
         place,
         pose_gap_secs: options.pose_gap_secs,
         is_one_clock: timeline.is_one_clock(captures, index) && timeline.is_one_clock(captures, timeline.posed),
+        focal_per_width: capture.hands_focal_per_width.filter(|f| f.is_finite() && *f > 0.0),
     }
 }
 
@@ -197,11 +225,15 @@ pub(super) fn contacts(captures: &[Capture], timeline: &Timeline, hands: &mut [H
 pub(super) fn clips(captures: &[Capture], timeline: &Timeline, report: &mut Report) -> Vec<Clip> {
     let Some(index) = captures.iter().position(|c| !c.clips.is_empty()) else { return Vec::new() };
     let source = &captures[index];
+    let chosen = of_this_video(captures, source, report);
+    let later = begins_at(captures, timeline, index, &chosen, report);
     let mut out: Vec<Clip> = Vec::new();
     let mut taken = BTreeSet::new();
     let mut by = By::Nothing;
-    for (i, clip) in source.clips.iter().enumerate() {
-        let Some((start, end, how)) = span(timeline, &clip.start, &clip.end) else { continue };
+    for (i, clip) in chosen.iter().enumerate() {
+        let Some((start, end, how)) = span(timeline, &clip.start.later(later), &clip.end.later(later)) else {
+            continue;
+        };
         by = how;
         let wanted = if clip.name.is_empty() { format!("clip_{i:03}") } else { clip.name.clone() };
         let (mut name, mut number) = (wanted.clone(), i);
@@ -218,8 +250,8 @@ pub(super) fn clips(captures: &[Capture], timeline: &Timeline, report: &mut Repo
             noun: clip.noun.clone(),
         });
     }
-    if out.len() < source.clips.len() {
-        report.dropped.push(format!("{} narrations that lie outside the frames", source.clips.len() - out.len()));
+    if out.len() < chosen.len() {
+        report.dropped.push(format!("{} narrations that lie outside the frames", chosen.len() - out.len()));
     }
     report.streams.push(Stream {
         stream: "clips".to_owned(),
@@ -231,22 +263,103 @@ pub(super) fn clips(captures: &[Capture], timeline: &Timeline, report: &mut Repo
     out
 }
 
-/// First and last frame between two places: by time where both have one, else by the video's frames, else by name.
+/// Of narrations of several videos those whose video the name of another source holds.
+fn of_this_video<'a>(captures: &[Capture], source: &'a Capture, report: &mut Report) -> Vec<&'a ClipAt> {
+    let mut videos: Vec<&str> = source.clip_videos.iter().map(String::as_str).collect();
+    videos.sort_unstable();
+    videos.dedup();
+    if videos.len() < 2 {
+        return source.clips.iter().collect();
+    }
+    let is_other = |c: &&Capture| c.source != source.source;
+    let is_meant = |video: &str| captures.iter().filter(is_other).any(|c| mentions(&c.source.to_string_lossy(), video));
+    let chosen: Vec<&str> = videos.iter().copied().filter(|v| is_meant(v)).collect();
+    if chosen.is_empty() {
+        report.dropped.push(format!(
+            "narrations of {} videos, none of which another source is named after; keep {}'s name in a source's path, or the \
+             video's rows in a file of their own",
+            videos.len(),
+            videos.first().copied().unwrap_or_default()
+        ));
+    }
+    let of = source.clips.iter().zip(&source.clip_videos);
+    of.filter(|(_, video)| chosen.contains(&video.as_str())).map(|(clip, _)| clip).collect()
+}
+
+/// Whether a path holds a name as a whole: `P01_10` is not in `P01_101.json`.
+fn mentions(path: &str, name: &str) -> bool {
+    let is_word = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
+    !name.is_empty()
+        && path.match_indices(name).any(|(at, _)| {
+            let (before, after) = (path.get(..at).unwrap_or_default(), path.get(at + name.len()..).unwrap_or_default());
+            !is_word(before.chars().next_back()) && !is_word(after.chars().next())
+        })
+}
+
+/// What is added to the narrations' times, seconds: those on no common clock that meet no frame, and would as times from the
+/// first frame on, are such.
+fn begins_at(captures: &[Capture], timeline: &Timeline, index: usize, clips: &[&ClipAt], report: &mut Report) -> f64 {
+    let (Some(first), Some(last)) = (timeline.frames.first(), timeline.frames.last()) else { return 0.0 };
+    let (first, last) = (first.time_secs, last.time_secs);
+    if timeline.is_one_clock(captures, index) {
+        return 0.0;
+    }
+    let meets = |later: f64| {
+        let spans = clips.iter().filter_map(|c| Some((c.start.time_secs? + later, c.end.time_secs? + later)));
+        spans.filter(|(a, b)| *a <= last && *b >= first).count()
+    };
+    if meets(0.0) > 0 || meets(first) == 0 {
+        return 0.0;
+    }
+    report.changes.push("narrations' times are taken to count from the first frame".to_owned());
+    first
+}
+
+/// First and last frame between two places: by time where the frames have times of their own and both places one, else by
+/// numbered names, by the video's frames, by counted times.
 fn span(timeline: &Timeline, start: &At, end: &At) -> Option<(usize, usize, By)> {
     let frames = &timeline.frames;
     let within = |by: By, first: Option<usize>, last: Option<usize>| match (first, last) {
         (Some(a), Some(b)) if a <= b => Some((a, b, by)),
         _ => None,
     };
-    if let (Some(a), Some(b)) = (start.time_secs, end.time_secs) {
+    let by_time = || {
+        let (a, b) = (start.time_secs?, end.time_secs?);
         let first = frames.iter().position(|f| f.time_secs >= a);
-        return within(By::Time, first, frames.iter().rposition(|f| f.time_secs <= b));
+        within(By::Time, first, frames.iter().rposition(|f| f.time_secs <= b))
+    };
+    let by_index = || {
+        let (a, b) = (start.index?, end.index?);
+        // A name that ends with a number tells the frame as well.
+        let number = |f: &Draft| {
+            let named = || names::numbered(f.at.name.as_ref()?).and_then(|(_, n)| usize::try_from(n).ok());
+            f.at.index.or_else(named)
+        };
+        let first = frames.iter().position(|f| number(f).is_some_and(|i| i >= a));
+        within(By::Index, first, frames.iter().rposition(|f| number(f).is_some_and(|i| i <= b)))
+    };
+    let by_name = || {
+        let (a, b) = (names::numbered(start.name.as_ref()?)?, names::numbered(end.name.as_ref()?)?);
+        let number = |f: &Draft| {
+            let (head, number) = names::numbered(f.at.name.as_ref()?)?;
+            (head == a.0 && head == b.0).then_some(number)
+        };
+        let first = frames.iter().position(|f| number(f).is_some_and(|n| n >= a.1));
+        within(By::Name, first, frames.iter().rposition(|f| number(f).is_some_and(|n| n <= b.1)))
+    };
+    if timeline.has_times && start.time_secs.is_some() && end.time_secs.is_some() {
+        return by_time();
     }
-    if let (Some(a), Some(b)) = (start.index, end.index) {
-        let first = frames.iter().position(|f| f.at.index.is_some_and(|i| i >= a));
-        return within(By::Index, first, frames.iter().rposition(|f| f.at.index.is_some_and(|i| i <= b)));
+    by_name().or_else(by_index).or_else(by_time)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_video_is_named_by_a_path_that_holds_its_whole_name() {
+        assert!(mentions("data/P01_10.json", "P01_10") && mentions("P01_10/frames", "P01_10"));
+        assert!(!mentions("data/P01_101.json", "P01_10") && !mentions("xP01_10", "P01_10") && !mentions("a", ""));
     }
-    let (a, b) = (start.name.as_ref()?, end.name.as_ref()?);
-    let first = frames.iter().position(|f| f.at.name.as_ref().is_some_and(|n| n >= a));
-    within(By::Name, first, frames.iter().rposition(|f| f.at.name.as_ref().is_some_and(|n| n <= b)))
 }

@@ -147,6 +147,7 @@ pub(super) const NEEDED: [(&str, &str, &str); 6] = [
     (
         "clips",
         "which part is moved when",
-        "write clips.json: {\"clips\": [{\"clip\", \"start_frame\", \"end_frame\", \"narration\"}]}",
+        "import narrations too (SRT, or CSV with start, end, narration), or write clips.json: \
+         {\"clips\": [{\"clip\", \"start_frame\", \"end_frame\", \"narration\"}]}",
     ),
 ];

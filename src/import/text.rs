@@ -129,9 +129,16 @@ fn start(text: &str) -> String {
 /// separate nothing; quotes about a cell stay.
 #[must_use]
 pub fn cells(line: &str) -> Vec<&str> {
-    let Some(separator) = [',', ';'].into_iter().find(|c| line.contains(*c)) else {
-        return line.split_whitespace().collect();
-    };
+    split(line, separator(line))
+}
+
+/// What separates the cells of a line; `None`: white space.
+fn separator(line: &str) -> Option<char> {
+    [',', ';'].into_iter().find(|c| line.contains(*c))
+}
+
+fn split(line: &str, separator: Option<char>) -> Vec<&str> {
+    let Some(separator) = separator else { return line.split_whitespace().collect() };
     let mut is_quoted = false;
     line.split(|c: char| {
         is_quoted ^= c == '"';
@@ -154,6 +161,8 @@ pub struct Table {
     lines: Lines,
     columns: BTreeMap<String, usize>,
     header: Vec<String>,
+    /// The header's: text in a row may hold other ones.
+    separator: Option<char>,
 }
 
 /// A row of a [`Table`].
@@ -175,7 +184,7 @@ impl Table {
         let header: Vec<String> = cells(&first).into_iter().map(|c| unquoted(c).to_ascii_lowercase()).collect();
         // Of two columns with one name the first counts.
         let columns = header.iter().enumerate().rev().map(|(i, name)| (name.clone(), i)).collect();
-        Ok(Self { lines, columns, header })
+        Ok(Self { lines, columns, header, separator: separator(&first) })
     }
 
     /// Whether there is a column.
@@ -204,7 +213,7 @@ impl Table {
     /// Where a row has another number of cells than the header.
     pub fn row(&mut self) -> Result<Option<Row<'_>>> {
         let Some(line) = self.lines.content()? else { return Ok(None) };
-        let cells: Vec<String> = cells(&line).into_iter().map(unquoted).collect();
+        let cells: Vec<String> = split(&line, self.separator).into_iter().map(unquoted).collect();
         if cells.len() != self.header.len() {
             let (found, expected) = (cells.len(), self.header.len());
             return Err(self.lines.fault(format!(

@@ -291,12 +291,14 @@ fn drafts(
     items: &Items,
     options: &Options,
 ) -> Result<Vec<Draft>> {
-    let common = options.camera.or(captures[base].optics).or_else(|| captures.iter().find_map(|c| c.optics));
+    let sure = |c: &Capture| c.optics.filter(|_| !c.optics_estimated);
+    let own = sure(&captures[base]);
+    let common = captures.iter().find_map(sure).or_else(|| captures.iter().find_map(|c| c.optics));
     let mut frames = Vec::new();
     for (i, (at, posed)) in ats.into_iter().zip(poses).enumerate() {
         let (Some((world_from_camera, of_pose)), Some(time_secs)) = (posed, at.time_secs) else { continue };
         let of_image = captures[base].images.get(i).and_then(|x| x.optics);
-        let Some(optics) = options.camera.or(of_image).or(captures[base].optics).or(of_pose).or(common) else {
+        let Some(optics) = options.camera.or(of_image).or(own).or(of_pose).or(common) else {
             return Err(Error::format(
                 &captures[base].source,
                 "intrinsics",

@@ -144,6 +144,13 @@ pub(super) fn depth_factor(captures: &[Capture], timeline: &Timeline, place: &Pl
     Some(place.scale / stats::median(&ratios)?)
 }
 
+/// The capture whose points are in the world of the one with the poses: that one, else the first one that has points and no
+/// poses, so no world of its own.
+pub(super) fn with_points(captures: &[Capture], posed: usize) -> Option<&Capture> {
+    let own = captures.get(posed).filter(|c| !c.points.is_empty());
+    own.or_else(|| captures.iter().find(|c| !c.points.is_empty() && c.poses.is_none()))
+}
+
 /// Of each frame that was looked at: depth (metric or not) over the depth of the points there, the median.
 fn depth_ratios(
     captures: &[Capture],
@@ -154,7 +161,7 @@ fn depth_ratios(
 ) -> Vec<f64> {
     /// Points of a frame that a ratio needs.
     const LEAST: usize = 20;
-    let capture = &captures[timeline.posed];
+    let Some(capture) = with_points(captures, timeline.posed) else { return Vec::new() };
     let points: Vec<Point> = capture.points.iter().map(|p| convention.point(p)).collect();
     let is_meant = |f: &&Draft| {
         let depth = f.depth.and_then(|d| captures.get(d.capture)).and_then(|c| c.depth.as_ref());

@@ -484,7 +484,7 @@ fn around(group: &Group, best: usize) -> Around {
     let surface = clip
         .region
         .as_ref()
-        .map_or_else(Vec::new, |region| clip::surface(&group.footage, &clip.clip, region, &clip.views, group.config));
+        .map_or_else(Vec::new, |region| clip::surface(&group.footage, region, &clip.views, group.config));
     Around { surface, stops: clip.face.as_ref().map_or_else(Vec::new, |face| clip::edges_on(face, &clip.lines)) }
 }
 

@@ -10,7 +10,7 @@ pub mod images;
 pub mod narration;
 pub mod npy;
 mod read;
-mod reconstruction;
+pub(crate) mod reconstruction;
 pub mod segments;
 pub mod sketch;
 mod sniff;

@@ -69,7 +69,8 @@ fn check_counts(path: &Path) -> Result<()> {
     Ok(())
 }
 
-fn ply_points(path: &Path) -> Result<Vec<Point>> {
+/// Vertices of a PLY file.
+pub(crate) fn ply_points(path: &Path) -> Result<Vec<Point>> {
     check_counts(path)?;
     let file = File::open(path).map_err(|e| Error::io(path, &e))?;
     let mut reader = BufReader::new(file);

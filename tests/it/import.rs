@@ -17,27 +17,27 @@ use serde_json::Value;
 use crate::common::{SMALL, paws, stderr};
 
 /// Frames that a test writes: enough to join, few enough to be quick.
-const FRAMES: usize = 24;
+pub(crate) const FRAMES: usize = 24;
 
-fn small() -> Recording {
+pub(crate) fn small() -> Recording {
     Recording::open(SMALL.path()).unwrap()
 }
 
-fn write(path: &Path, bytes: impl AsRef<[u8]>) {
+pub(crate) fn write(path: &Path, bytes: impl AsRef<[u8]>) {
     std::fs::create_dir_all(path.parent().unwrap()).unwrap();
     std::fs::write(path, bytes).unwrap();
 }
 
-fn still(name: &str, frame: usize) -> PathBuf {
+pub(crate) fn still(name: &str, frame: usize) -> PathBuf {
     SMALL.path().join(name).join(format!("{frame:06}.{}", if name == "frames" { "jpg" } else { "png" }))
 }
 
-fn copy(from: &Path, to: &Path) {
+pub(crate) fn copy(from: &Path, to: &Path) {
     write(to, std::fs::read(from).unwrap());
 }
 
 /// Runs `paws import` and expects it to do its work.
-fn import(args: &[&str], dir: &Path) -> String {
+pub(crate) fn import(args: &[&str], dir: &Path) -> String {
     let mut all = vec!["import"];
     all.extend(args);
     all.extend(["--out", "out"]);
@@ -46,12 +46,12 @@ fn import(args: &[&str], dir: &Path) -> String {
     String::from_utf8(out.stdout).unwrap()
 }
 
-fn json(path: &Path) -> Value {
+pub(crate) fn json(path: &Path) -> Value {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
 /// The poses of an imported recording.
-fn poses(out: &Path) -> Vec<Pose> {
+pub(crate) fn poses(out: &Path) -> Vec<Pose> {
     let cameras = json(&out.join("cameras.json"));
     let read = |v: &Value| -> Vec<f64> { serde_json::from_value(v.clone()).unwrap() };
     cameras["frames"]
@@ -66,11 +66,11 @@ fn poses(out: &Path) -> Vec<Pose> {
         .collect()
 }
 
-fn same_bytes(a: &Path, b: &Path) -> bool {
+pub(crate) fn same_bytes(a: &Path, b: &Path) -> bool {
     std::fs::read(a).unwrap() == std::fs::read(b).unwrap()
 }
 
-fn depth_mm(path: &Path) -> Vec<u16> {
+pub(crate) fn depth_mm(path: &Path) -> Vec<u16> {
     match image::open(path).unwrap() {
         image::DynamicImage::ImageLuma16(image) => image.into_raw(),
         other => panic!("{:?}", other.color()),
@@ -78,7 +78,7 @@ fn depth_mm(path: &Path) -> Vec<u16> {
 }
 
 /// Largest distance of two sets of poses, metres and degrees.
-fn apart(a: &[Pose], b: &[Pose]) -> (f64, f64) {
+pub(crate) fn apart(a: &[Pose], b: &[Pose]) -> (f64, f64) {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).fold((0.0, 0.0), |(m, deg), (a, b)| {
         let distance = (a.translation.vector - b.translation.vector).norm();
@@ -238,7 +238,7 @@ fn tum_sequences_come_back_as_they_were() {
 }
 
 /// COLMAP of the same kitchen in a world of its own: turned, moved, of another scale.
-fn write_colmap(root: &Path, is_binary: bool, metres_per_unit: f64) -> Vec<Pose> {
+pub(crate) fn write_colmap(root: &Path, is_binary: bool, metres_per_unit: f64) -> Vec<Pose> {
     let recording = small();
     let turn = Pose::from_parts(Vector::new(0.3, -1.0, 2.0).into(), UnitQuaternion::from_euler_angles(0.5, -0.4, 1.0));
     let c = recording.camera;
@@ -459,7 +459,7 @@ fn hands_of_which_nobody_says_whether_they_hold_are_told_as_such() {
 }
 
 /// Breaks a source and expects `paws import` to name all of `words`, and to leave nothing behind.
-fn refused(name: &str, words: &[&str], break_it: impl Fn(&Path)) {
+pub(crate) fn refused(name: &str, words: &[&str], break_it: impl Fn(&Path)) {
     let dir = tempfile::tempdir().unwrap();
     break_it(dir.path());
     let out = paws(&["import", "source", "--out", "out"], dir.path());
@@ -472,7 +472,7 @@ fn refused(name: &str, words: &[&str], break_it: impl Fn(&Path)) {
 }
 
 /// Replaces a text in a file.
-fn edit(path: &Path, from: &str, to: &str) {
+pub(crate) fn edit(path: &Path, from: &str, to: &str) {
     let text = std::fs::read_to_string(path).unwrap();
     assert!(text.contains(from), "{from}");
     std::fs::write(path, text.replacen(from, to, 1)).unwrap();

@@ -12,6 +12,7 @@ mod formats;
 mod honesty;
 mod hostile;
 mod import;
+mod import_tools;
 mod known_truth;
 mod mjcf;
 mod models;

@@ -3,11 +3,25 @@
 //! A reader fills a [`Capture`] with what the files hold and declares it; it converts nothing. It reads tables at once and
 //! leaves images as blobs. Its errors name file, place and way out. `detect` looks at names and first lines only.
 
+mod arkitscenes;
+mod arti4d;
+mod cloud;
 mod colmap;
 mod colmap_binary;
+mod epic_fields;
 mod frames;
+mod grounded_sam;
+mod hands;
+mod hands23;
+mod lines2d;
+mod mapanything;
+mod moge;
+mod narrations;
+mod nerfstudio;
 mod stray;
+mod subtitles;
 mod tum;
+mod wilor;
 
 use std::path::Path;
 
@@ -51,6 +65,111 @@ pub const ALL: &[Format] = &[
         holds: "poses, images, depth",
         detect: tum::detect,
         read: tum::read,
+    },
+    Format {
+        name: "arkitscenes",
+        title: "ARKitScenes raw scan",
+        holds: "poses, images, depth",
+        detect: arkitscenes::detect,
+        read: arkitscenes::read,
+    },
+    Format {
+        name: "arti4d",
+        title: "Arti4D sequence",
+        holds: "poses, images, depth, clips",
+        detect: arti4d::detect,
+        read: arti4d::read,
+    },
+    Format {
+        name: "nerfstudio",
+        title: "nerfstudio, instant-ngp: transforms.json",
+        holds: "poses, intrinsics, images, depth, points",
+        detect: nerfstudio::detect,
+        read: nerfstudio::read,
+    },
+    Format {
+        name: "epic-fields",
+        title: "EPIC-Fields JSON",
+        holds: "poses, intrinsics, points",
+        detect: epic_fields::detect,
+        read: epic_fields::read,
+    },
+    Format {
+        name: "mapanything",
+        title: "MapAnything, as COLMAP files (to be named)",
+        holds: "poses, intrinsics, points, images",
+        detect: mapanything::detect,
+        read: mapanything::read,
+    },
+    Format {
+        name: "moge",
+        title: "MoGe-2 folders (--maps)",
+        holds: "depth, normals, images",
+        detect: moge::detect,
+        read: moge::read,
+    },
+    Format {
+        name: "wilor",
+        title: "WiLoR or HaMeR meshes (OBJ)",
+        holds: "hands",
+        detect: wilor::detect,
+        read: wilor::read,
+    },
+    Format {
+        name: "hands",
+        title: "hands and cameras as JSON lines (examples/import: HaWoR, WiLoR, HOI4D)",
+        holds: "hands, poses",
+        detect: hands::detect,
+        read: hands::read,
+    },
+    Format {
+        name: "hands23",
+        title: "Hands23 result.json",
+        holds: "contact, masks of hands",
+        detect: hands23::detect,
+        read: hands23::read,
+    },
+    Format {
+        name: "grounded-sam",
+        title: "Grounded-SAM-2 results",
+        holds: "masks",
+        detect: grounded_sam::detect,
+        read: grounded_sam::read,
+    },
+    Format {
+        name: "deeplsd",
+        title: "DeepLSD npz files",
+        holds: "line segments",
+        detect: lines2d::detect_deeplsd,
+        read: lines2d::read_deeplsd,
+    },
+    Format {
+        name: "limap",
+        title: "LIMAP segments",
+        holds: "line segments",
+        detect: lines2d::detect_limap,
+        read: lines2d::read_limap,
+    },
+    Format {
+        name: "narrations",
+        title: "narrations (EPIC-KITCHENS, HD-EPIC, any): CSV or JSON lines",
+        holds: "clips",
+        detect: narrations::detect,
+        read: narrations::read,
+    },
+    Format {
+        name: "subtitles",
+        title: "subtitles: SRT, WebVTT",
+        holds: "clips",
+        detect: subtitles::detect,
+        read: subtitles::read,
+    },
+    Format {
+        name: "cloud",
+        title: "a static reconstruction: OBJ, PLY, glTF, CSV of points",
+        holds: "points",
+        detect: cloud::detect,
+        read: cloud::read,
     },
     Format {
         name: "frames",
