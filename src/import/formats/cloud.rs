@@ -4,6 +4,8 @@
 //! triangles is more than its corners.
 
 use std::collections::VecDeque;
+use std::fs::File;
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use nalgebra::Matrix4;
@@ -13,7 +15,7 @@ use crate::import::Options;
 use crate::import::blob::{Blob, inside};
 use crate::import::capture::Capture;
 use crate::import::names::{ending, head};
-use crate::import::text::Table;
+use crate::import::text::{Lines, Table};
 use crate::math::Point;
 use crate::recording::reconstruction;
 
@@ -93,7 +95,11 @@ fn table(path: &Path) -> Result<Vec<Point>> {
 
 fn obj(path: &Path) -> Result<Vec<Point>> {
     let options = tobj::LoadOptions { triangulate: true, ignore_lines: true, ..Default::default() };
-    let (models, _) = tobj::load_obj(path, &options)
+    check_corners(path)?;
+    let file = File::open(path).map_err(|e| Error::io(path, &e))?;
+    // Materials are of no use here, and their files may lie anywhere.
+    let none = |_: &Path| Ok(Default::default());
+    let (models, _) = tobj::load_obj_buf(&mut BufReader::new(file), &options, none)
         .map_err(|e| Error::format(path, "obj", format!("cannot be read ({e}); export the mesh again")))?;
     let mut out = Vec::new();
     let mut triangles = Vec::new();
@@ -109,6 +115,44 @@ fn obj(path: &Path) -> Result<Vec<Point>> {
     }
     out.extend(sampled(&triangles));
     Ok(out)
+}
+
+/// Corners of faces must name what is there, which tobj takes for granted.
+fn check_corners(path: &Path) -> Result<()> {
+    let mut lines = Lines::open(path)?;
+    // Vertices, texture coordinates, normals.
+    let mut there = [0i64; 3];
+    let mut highest: [(i64, usize); 3] = [(0, 0); 3];
+    let wrong = |line: usize, name: i64| {
+        let message = format!("a face names corner {name}, which is not there; export the mesh again");
+        Err(Error::format(path, format!("line {line}"), message))
+    };
+    let mut number = 0;
+    while let Some(line) = lines.line()? {
+        number += 1;
+        let mut words = line.split_ascii_whitespace();
+        match words.next() {
+            Some("v") => there[0] += 1,
+            Some("vt") => there[1] += 1,
+            Some("vn") => there[2] += 1,
+            Some("f" | "l" | "p") => {
+                for (k, name) in words.flat_map(|w| w.split('/').take(3).enumerate()).filter(|(_, n)| !n.is_empty()) {
+                    let Ok(name) = name.parse::<i64>() else { return wrong(number, 0) };
+                    if name == 0 || name < -there[k] {
+                        return wrong(number, name);
+                    }
+                    if name > highest[k].0 {
+                        highest[k] = (name, number);
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+    match highest.iter().zip(there).find(|((name, _), there)| name > there) {
+        Some(((name, line), _)) => wrong(*line, *name),
+        None => Ok(()),
+    }
 }
 
 /// Triangles of corners by three; those that name no vertex are left out.
