@@ -257,6 +257,9 @@ pub fn read(path: &Path, format: Option<&str>, options: &Options) -> Result<Scen
     for (file, value) in &values {
         let one = (format.read)(&Source { path: file, value, options })?;
         scene.up = one.up;
+        if path.is_file() {
+            scene.name.clone_from(&one.name);
+        }
         scene.joints.extend(one.joints);
         scene.left_out.extend(one.left_out);
         for note in one.notes {

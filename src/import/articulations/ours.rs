@@ -72,8 +72,10 @@ struct Articulated {
 
 /// A recording's truth has joints as well, and clips that show them.
 fn is_truth(value: &Value) -> bool {
-    let first = value.get("joints").and_then(|joints| joints.get(0));
-    first.is_some_and(|joint| joint.get("origin_handle").is_some())
+    match value.get("joints").and_then(|joints| joints.get(0)) {
+        Some(joint) => joint.get("origin_handle").is_some(),
+        None => value.get("clips").is_some(),
+    }
 }
 
 pub(super) fn detect(value: &Value) -> bool {
