@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use serde_json::Value;
 
-use super::joints::JointArgs;
+use super::joints::{self, JointArgs};
 use super::shown;
 use crate::evaluation::parts::{PartReport, compare_parts};
 use crate::evaluation::{Predictions, Report, Truth, evaluate, scenes};
@@ -20,7 +20,7 @@ const OVERLAPS: [f64; 2] = [0.5, 0.25];
 
 /// Whether a truth is joints of a data set, and no recording.
 pub fn is_scene(path: &Path) -> bool {
-    !path.join("ground_truth.json").exists() && articulations::holds(path)
+    joints::is_model(path) || (!path.join("ground_truth.json").exists() && articulations::holds(path))
 }
 
 /// What came of comparing joints.
@@ -54,7 +54,7 @@ pub fn run(predictions: &[PathBuf], truths: &[PathBuf], args: &JointArgs) -> any
             truth.name = format!("{} ({})", truth.name, names.len() + 1);
             names.insert(truth.name.clone());
         }
-        let predicted = predicted(prediction, &truth)?;
+        let predicted = predicted(prediction, &truth, args)?;
         for left in &predicted.left_out {
             eprintln!("{}: {}: is no answer: {}", shown(prediction), left.place, left.reason);
         }
@@ -96,7 +96,7 @@ fn tell(prediction: &Path, truth_file: &Path, predicted: &Scene, truth: &Scene, 
     ] {
         if count > 0 {
             eprintln!(
-                "{}: {count} joints have no {what}: under {rules} their hinges count as wrong",
+                "{}: {count} joints have no {what}, which {rules} ask for and count as wrong (slides need no box)",
                 shown(truth_file)
             );
         }
@@ -104,14 +104,14 @@ fn tell(prediction: &Path, truth_file: &Path, predicted: &Scene, truth: &Scene, 
 }
 
 /// The predicted joints of a file: of any format of joints, or of our `predictions.json`.
-fn predicted(path: &Path, truth: &Scene) -> anyhow::Result<Scene> {
+fn predicted(path: &Path, truth: &Scene, args: &JointArgs) -> anyhow::Result<Scene> {
     let file = match path.join("twin.json") {
         twin if path.is_dir() && twin.exists() => twin,
         _ => path.to_owned(),
     };
-    let is_rows = file.is_file() && json::read::<Value>(&file)?.get("predictions").is_some();
-    // A forced format is the truth's; points as well.
-    if is_rows { from_rows(&file, truth) } else { JointArgs::default().read(&file) }
+    let is_rows =
+        file.is_file() && !joints::is_model(&file) && json::read::<Value>(&file)?.get("predictions").is_some();
+    if is_rows { from_rows(&file, truth) } else { args.of_prediction().read(&file) }
 }
 
 /// Rows about clips as joints: of each joint the first row.

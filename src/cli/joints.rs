@@ -11,10 +11,12 @@ use crate::articulation::JointKind;
 use crate::config::Config;
 use crate::evaluation::scenes::oriented;
 use crate::fitting::joints::{self, Entry, JointsFile, Units};
+use crate::import::articulations::shape::PartBox;
 use crate::import::articulations::{self, Joint, Options, Scene};
 use crate::json;
 use crate::math::Vector;
-use crate::twin::{LeftOut, OrientedBox, Twin};
+use crate::model::{self, furniture};
+use crate::twin::{LeftOut, OrientedBox, Part, Twin};
 
 /// How far a hinge is taken to open where its file does not say, radians: 110 degrees, as our own.
 const HINGE_RAD: f64 = 110.0 * std::f64::consts::PI / 180.0;
@@ -42,8 +44,16 @@ impl JointArgs {
         self.from.is_some()
     }
 
-    /// The joints of a file or folder; what was taken for granted is told.
+    /// The same for predictions, whose format a forced one does not have to be.
+    pub fn of_prediction(&self) -> Self {
+        Self { from: None, ..self.clone() }
+    }
+
+    /// The joints of a file or folder, or of a URDF or MJCF file; what was taken for granted is told.
     pub fn read(&self, path: &Path) -> anyhow::Result<Scene> {
+        if self.from.is_none() && is_model(path) {
+            return of_model(path);
+        }
         let options = Options { points: self.points.clone(), types: self.types.clone() };
         let scene = articulations::read(path, self.from.as_deref(), &options)?;
         for note in &scene.notes {
@@ -83,6 +93,47 @@ impl JointArgs {
         twin.left_out.extend(left_out);
         Ok((twin, file.up))
     }
+}
+
+/// Whether a file is a URDF or MJCF, by its name.
+pub fn is_model(path: &Path) -> bool {
+    path.is_file() && path.extension().is_some_and(|e| e.eq_ignore_ascii_case("urdf") || e.eq_ignore_ascii_case("xml"))
+}
+
+/// The joints of a URDF or MJCF file in its world frame, closed.
+fn of_model(path: &Path) -> anyhow::Result<Scene> {
+    let (twin, notes) = furniture::to_twin(&model::read(path)?);
+    for note in &notes {
+        eprintln!("{}: {note}", shown(path));
+    }
+    let joint = |part: &Part| {
+        let (phi, bounds) = (part.joint.articulation, part.bounds);
+        Joint {
+            id: part.id.clone(),
+            label: part.label.clone(),
+            kind: phi.kind,
+            axis: phi.axis,
+            origin: phi.origin,
+            range: Some([0.0, part.joint.upper]),
+            part: Some(PartBox { center: bounds.center, half: bounds.half, rotation: bounds.rotation }),
+            base: None,
+            handle: Some(part.handle),
+            points: None,
+            score: None,
+        }
+    };
+    Ok(Scene {
+        name: twin.name.clone(),
+        format: "model",
+        up: Vector::z(),
+        joints: twin.furniture.iter().map(|f| joint(&f.part)).collect(),
+        left_out: twin
+            .left_out
+            .iter()
+            .map(|left| articulations::LeftOut { place: left.id.clone(), reason: left.reason.clone() })
+            .collect(),
+        notes: Vec::new(),
+    })
 }
 
 /// Whether a file is in our own format, which is read to the letter.
