@@ -118,7 +118,9 @@ fn joint(
 ) -> std::result::Result<Joint, String> {
     let object = objects.iter().find(|o| o.part_ids.contains(&part.part_id));
     let label = match object {
-        Some(object) if !object.label.is_empty() => format!("{}:{}", object.label, part.label),
+        Some(object) if !object.label.is_empty() && !part.label.contains(':') => {
+            format!("{}:{}", object.label, part.label)
+        }
         _ => part.label.clone(),
     };
     let motion: Motion = Source::entry(motion)?;
