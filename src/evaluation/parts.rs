@@ -82,7 +82,7 @@ pub fn compare_parts(scenes: &[(&Scene, &Scene)], least: f64) -> Option<PartRepo
     if count == 0 {
         return None;
     }
-    let found = both.iter().map(|b| found(b, least)).fold([0; 5], |sum, f| std::array::from_fn(|i| sum[i] + f[i]));
+    let found = both.iter().map(|b| found(b, least)).fold([0usize; 5], |sum, f| std::array::from_fn(|i| sum[i] + f[i]));
     let share = |of: usize| found.map(|f| f as f64 / of as f64);
     let ap = |level: usize| {
         let classes = [JointKind::Revolute, JointKind::Prismatic];
@@ -113,7 +113,7 @@ fn found(both: &Both<'_>, least: f64) -> [usize; 5] {
     }
     all.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
     let mut taken = (vec![false; both.truth.len()], vec![false; both.predicted.len()]);
-    let mut count = [0; 5];
+    let mut count = [0usize; 5];
     for (_, t, p, levels) in all {
         if !taken.0[t] && !taken.1[p] {
             (taken.0[t], taken.1[p]) = (true, true);

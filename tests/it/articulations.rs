@@ -74,7 +74,10 @@ fn artipoints_segments_are_joints_with_the_openings_of_their_hands() {
     assert_eq!((scene.format, scene.name.as_str(), scene.joints.len()), ("artipoint", "out", 2));
     check(&scene.joints[0], (Revolute, [0.0, 0.0, 1.0], [0.3, 0.0, 1.0], Some([0.0, 1.4])));
     check(&scene.joints[1], (Prismatic, [0.0, 1.0, 0.0], [1.0, 2.0, 0.5], Some([-0.3, 0.0])));
-    assert_eq!(scene.joints[0].label, "segment_9, frames 10 to 60");
+    assert_eq!(
+        (scene.joints[0].id.as_str(), scene.joints[0].label.as_str()),
+        ("segment_9", "segment_9, frames 10 to 60")
+    );
 }
 
 #[test]

@@ -50,7 +50,7 @@ fn joint(name: &str, info: &AxisInfo) -> std::result::Result<Joint, String> {
         _ => name.to_owned(),
     };
     let range = range(info, joint.kind == crate::articulation::JointKind::Revolute)?;
-    Ok(Joint { label, range, ..joint })
+    Ok(Joint { id: name.to_owned(), label, range, ..joint })
 }
 
 /// The opening that the hand went through, rad or m.

@@ -307,7 +307,7 @@ impl Scene {
     fn name_joints(&mut self) {
         let mut taken = BTreeSet::new();
         for joint in &mut self.joints {
-            let wanted = safe(&joint.label);
+            let wanted = safe(if joint.id.is_empty() { &joint.label } else { &joint.id });
             let mut id = wanted.clone();
             let mut number = 2;
             while !taken.insert(id.clone()) {
