@@ -69,12 +69,12 @@ fn levels(m: &Measured) -> [bool; 5] {
 pub fn compare_parts(scenes: &[(&Scene, &Scene)], least: f64) -> Option<PartReport> {
     let both: Vec<Both<'_>> = scenes
         .iter()
-        .map(|(predicted, truth)| {
+        .map(|&(predicted, truth)| {
             let true_parts = parts(truth);
             let mut labelled: Vec<usize> = true_parts.iter().flat_map(|(_, points)| points.iter().copied()).collect();
             labelled.sort_unstable();
             labelled.dedup();
-            Both { truth: true_parts, predicted: parts(predicted), labelled, scene: *truth }
+            Both { truth: true_parts, predicted: parts(predicted), labelled, scene: truth }
         })
         .collect();
     let count: usize = both.iter().map(|b| b.truth.len()).sum();
