@@ -70,6 +70,18 @@ pub fn read<T: DeserializeOwned>(path: &Path) -> Result<T> {
     parse(&text, path)
 }
 
+/// Reads a value that was parsed already: for lists of which one bad entry costs only itself.
+///
+/// # Errors
+/// The way from the value to what does not fit, what was given and what is wanted.
+pub fn of_value<T: DeserializeOwned>(value: &serde_json::Value) -> std::result::Result<T, String> {
+    match typed::explain::<T>(value) {
+        Some((place, message)) if place == typed::WHOLE => Err(message),
+        Some((place, message)) => Err(format!("{place}: {message}")),
+        None => <T as serde::Deserialize<'_>>::deserialize(value).map_err(|e| e.to_string()),
+    }
+}
+
 fn parse<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T> {
     let error = match serde_json::from_str(text) {
         Ok(value) => return Ok(value),

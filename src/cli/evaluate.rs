@@ -7,8 +7,11 @@ use anyhow::bail;
 use clap::Args;
 use serde::Serialize;
 
+use super::evaluate_joints::{self, Compared};
+use super::joints::JointArgs;
 use super::output::write_file;
 use super::{Answer, print, shown};
+use crate::evaluation::parts::PartReport;
 use crate::evaluation::{Paired, Predictions, Report, Truth, compare, evaluate};
 use crate::json;
 use crate::report::accuracy;
@@ -16,10 +19,11 @@ use crate::report::accuracy;
 #[derive(Debug, Args)]
 pub struct EvaluateArgs {
     /// predictions.json, or a folder that `paws twin` wrote; then the recordings with a ground_truth.json, or such files.
-    /// With --truth all of them are predictions, taken together
+    /// With --truth all of them are predictions, taken together. Joints of data sets (docs/joints-format.md) are compared as
+    /// well: PREDICTED TRUE
     #[arg(required = true, value_name = "PREDICTIONS RECORDING")]
     inputs: Vec<PathBuf>,
-    /// Recordings with a ground_truth.json, or such files
+    /// Recordings with a ground_truth.json, or such files; or the true joints of as many predictions
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     truth: Vec<PathBuf>,
     /// One line a clip as well
@@ -37,6 +41,8 @@ pub struct EvaluateArgs {
     /// Write one row a clip with every measure and every rule's verdict as CSV to this file
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    #[command(flatten)]
+    joints: JointArgs,
 }
 
 /// The JSON report.
@@ -47,6 +53,9 @@ struct File<'a> {
     /// The difference to other predictions.
     #[serde(skip_serializing_if = "Option::is_none")]
     against: Option<Vec<Paired>>,
+    /// Found parts, where both sides list the points of parts.
+    #[serde(skip_serializing_if = "<[PartReport]>::is_empty")]
+    parts: &'a [PartReport],
 }
 
 pub fn run(args: &EvaluateArgs) -> anyhow::Result<Answer> {
@@ -55,6 +64,9 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<Answer> {
         ([], [file, recordings @ ..]) => (std::slice::from_ref(file), recordings),
         (recordings, files) => (files, recordings),
     };
+    if args.joints.is_forced() || recordings.iter().any(|p| evaluate_joints::is_scene(p)) {
+        return of_joints(args, files, recordings);
+    }
     let truths = truths(recordings)?;
     let report = evaluate(&predictions(files, &truths)?, &truths);
     let against = match &args.against {
@@ -78,7 +90,30 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<Answer> {
         write_file(path, accuracy::csv(&report))?;
     }
     if let Some(path) = &args.json {
-        write_file(path, json::text(&File { report: &report, against })?)?;
+        write_file(path, json::text(&File { report: &report, against, parts: &[] })?)?;
+    }
+    Ok(Answer::Yes)
+}
+
+/// Joints against the joints of a data set.
+fn of_joints(args: &EvaluateArgs, files: &[PathBuf], truths: &[PathBuf]) -> anyhow::Result<Answer> {
+    if args.against.is_some() {
+        bail!("--against compares predictions about recordings; evaluate both files against the joints instead");
+    }
+    let Compared { report, parts } = evaluate_joints::run(files, truths, &args.joints)?;
+    if args.clips {
+        print(&accuracy::per_clip(&report))?;
+    }
+    print(&accuracy::headline(&report))?;
+    if args.details {
+        print(&accuracy::details(&report))?;
+    }
+    print(&crate::report::parts::table(&parts))?;
+    if let Some(path) = &args.csv {
+        write_file(path, accuracy::csv(&report))?;
+    }
+    if let Some(path) = &args.json {
+        write_file(path, json::text(&File { report: &report, against: None, parts: &parts })?)?;
     }
     Ok(Answer::Yes)
 }

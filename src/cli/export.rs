@@ -6,10 +6,13 @@ use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use rayon::prelude::*;
 
+use super::joints::{JointArgs, is_joints};
 use super::output::{restore, write_file};
 use super::{Answer, print, shown};
-use crate::config::Config;
-use crate::fitting::joints::{self, JointsFile};
+use crate::evaluation::Predictions;
+use crate::export::annotations::{self, Shown};
+use crate::import::ply::Cloud;
+use crate::import::{articulations, ply};
 use crate::validation::Validation;
 use crate::{export, json, twin::Twin};
 
@@ -26,15 +29,25 @@ pub enum Format {
     GltfPhysics,
     /// OpenUSD text with UsdPhysics, for Isaac
     Usd,
+    /// Arti4D's list of joints (arti4d.json)
+    Arti4d,
+    /// EgoArti's list of clips and their annotations (egoarti_list.json, egoarti.json)
+    Egoarti,
+    /// What USDNet is trained on: parts as points of --points, with their joints (usdnet_articulation.json, usdnet.npy,
+    /// usdnet_instance_gt.txt)
+    Usdnet,
 }
 
 #[derive(Debug, Args)]
 pub struct ExportArgs {
-    /// A twin.json, the folder that `paws twin` wrote, or joints found elsewhere (docs/joints-format.md)
+    /// A twin.json, the folder that `paws twin` wrote, or joints found elsewhere: our own format, or those of data sets and
+    /// other programs (docs/joints-format.md)
     twin: PathBuf,
     /// Formats, separated by commas
     #[arg(long, value_delimiter = ',', default_value = "urdf,mjcf,gltf,gltf-physics,usd")]
     format: Vec<Format>,
+    #[command(flatten)]
+    joints: JointArgs,
     /// Folder for scene.urdf, scene.xml, kitchen.xml, scene.glb, physics.glb, scene.usda; and for twin.json where joints
     /// were given
     #[arg(long, value_name = "DIR", default_value = ".")]
@@ -62,20 +75,23 @@ enum Given {
 /// Tells a twin from joints by the keys of the file.
 fn kind_of(path: &Path) -> anyhow::Result<Given> {
     if path.is_dir() {
-        return Ok(Given::Twin);
+        return Ok(if is_joints(path) { Given::Joints } else { Given::Twin });
     }
     let value: serde_json::Value = json::read(path)?;
     match (value.get("furniture").is_some(), value.get("joints").is_some()) {
         (true, _) => Ok(Given::Twin),
         (false, true) => Ok(Given::Joints),
+        (false, false) if articulations::detect(&value).is_some() => Ok(Given::Joints),
         (false, false) if value.is_array() => bail!(
-            "{}: is a list; an object is wanted, with \"furniture\" (a twin) or with \"scene\" and \"joints\" \
-             (docs/joints-format.md)",
+            "{}: is a list; an object is wanted, with \"furniture\" (a twin) or with \"scene\" and \"joints\", or joints as \
+             other programs write them (docs/joints-format.md)",
             shown(path)
         ),
         (false, false) => bail!(
-            "{}: neither a twin (it has no \"furniture\") nor joints (it has no \"joints\"; see docs/joints-format.md)",
-            shown(path)
+            "{}: neither a twin (it has no \"furniture\") nor joints (it has no \"joints\", and is in no other format that is \
+             read: {}; see docs/joints-format.md)",
+            shown(path),
+            articulations::names()
         ),
     }
 }
@@ -83,24 +99,80 @@ fn kind_of(path: &Path) -> anyhow::Result<Given> {
 /// A file's name and contents.
 type File = (&'static str, Vec<u8>);
 
+/// What formats need beside the twin.
+struct Beside {
+    /// Verdicts of joints.
+    verdicts: Vec<(String, String)>,
+    /// Clips with their joints.
+    clips: Vec<Shown>,
+    /// The reconstruction.
+    cloud: Option<Cloud>,
+}
+
+impl Beside {
+    /// What the asked formats need.
+    fn of(args: &ExportArgs, verdicts: Vec<(String, String)>) -> anyhow::Result<Self> {
+        let clips = if args.format.contains(&Format::Egoarti) { clips(&args.twin)? } else { Vec::new() };
+        let cloud = match (&args.joints.points, args.format.contains(&Format::Usdnet)) {
+            (_, false) => None,
+            (Some(points), true) => Some(ply::read(points)?),
+            (None, true) => bail!("usdnet: parts are points of a reconstruction: give it by --points FILE.ply"),
+        };
+        Ok(Self { verdicts, clips, cloud })
+    }
+}
+
+/// The clips of the predictions beside a twin, with the joints that they show.
+fn clips(twin: &Path) -> anyhow::Result<Vec<Shown>> {
+    let path = match twin.is_dir() {
+        true => twin.join("predictions.json"),
+        false => twin.with_file_name("predictions.json"),
+    };
+    if !path.is_file() {
+        bail!("{}: no such file; egoarti lists clips, which a folder that `paws twin` wrote has", shown(&path));
+    }
+    let rows = Predictions::read(&path)?.predictions;
+    Ok(rows
+        .into_iter()
+        .filter_map(|row| Some(Shown { recording: row.recording, clip: row.clip, joint: row.joint? }))
+        .collect())
+}
+
 /// The files of one format.
-fn written(format: Format, twin: &Twin, verdicts: &[(String, String)]) -> crate::error::Result<Vec<File>> {
+fn written(format: Format, twin: &Twin, beside: &Beside) -> crate::error::Result<Vec<File>> {
     Ok(match format {
         Format::Urdf => vec![("scene.urdf", export::urdf::write(twin)?.into_bytes())],
         Format::Mjcf => vec![
             ("scene.xml", export::mjcf::write(twin)?.into_bytes()),
             ("kitchen.xml", export::mjcf::write_model(twin)?.into_bytes()),
         ],
-        Format::Gltf => vec![("scene.glb", export::gltf::write(twin, verdicts)?)],
+        Format::Gltf => vec![("scene.glb", export::gltf::write(twin, &beside.verdicts)?)],
         Format::GltfPhysics => vec![("physics.glb", export::gltf::write_physics(twin)?)],
         Format::Usd => vec![("scene.usda", export::usd::write(twin)?.into_bytes())],
+        Format::Arti4d => vec![("arti4d.json", annotations::arti4d(twin)?.into_bytes())],
+        Format::Egoarti => {
+            let [list, all] = annotations::egoarti(twin, &beside.clips)?;
+            vec![("egoarti_list.json", list.into_bytes()), ("egoarti.json", all.into_bytes())]
+        }
+        Format::Usdnet => {
+            let Some(cloud) = &beside.cloud else { return Ok(Vec::new()) };
+            let parts = annotations::usdnet(twin, cloud)?;
+            for id in &parts.unseen {
+                eprintln!("usdnet: {id}: no point of the reconstruction lies on it; it is left out");
+            }
+            vec![
+                ("usdnet_articulation.json", parts.articulation.into_bytes()),
+                ("usdnet.npy", parts.points),
+                ("usdnet_instance_gt.txt", parts.instances.into_bytes()),
+            ]
+        }
     })
 }
 
 pub fn run(args: &ExportArgs) -> anyhow::Result<Answer> {
     // Every format is made before the first is written: nothing half-done is left behind.
     let mut files: Vec<File> = Vec::new();
-    let given = kind_of(&args.twin)?;
+    let given = if args.joints.is_forced() { Given::Joints } else { kind_of(&args.twin)? };
     // What could not be built of a twin was said when it was made.
     let made_here = matches!(given, Given::Joints);
     let (twin, verdicts) = match given {
@@ -115,8 +187,7 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<Answer> {
         }
         Given::Joints => {
             let path = &args.twin;
-            let file: JointsFile = json::read(path)?;
-            let twin = joints::from_joints(&file, &Config::default().fitting).with_context(|| shown(path))?;
+            let (twin, _) = args.joints.twin(path)?;
             let target = args.out.join("twin.json");
             if target.canonicalize().is_ok_and(|t| path.canonicalize().is_ok_and(|p| p == t)) {
                 bail!("{}: would be replaced by the twin made of it; choose another --out", shown(path));
@@ -125,8 +196,9 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<Answer> {
             (twin, Vec::new())
         }
     };
+    let beside = Beside::of(args, verdicts)?;
     let made: Vec<crate::error::Result<Vec<File>>> =
-        args.format.par_iter().map(|format| written(*format, &twin, &verdicts)).collect();
+        args.format.par_iter().map(|format| written(*format, &twin, &beside)).collect();
     for format in made {
         files.extend(format?);
     }

@@ -4,12 +4,15 @@ use std::path::Path;
 
 use anyhow::bail;
 use clap::{Args, ValueEnum};
+use nalgebra::UnitQuaternion;
 
+use super::joints::JointArgs;
 use super::moved::{self, Motion};
 use super::shown;
 use super::twin::JointHands;
 use super::units::UnitsArgs;
 use crate::articulation::Action;
+use crate::fitting::joints::upright;
 use crate::hands::{Sample, Trajectory};
 use crate::inference::bare;
 use crate::math::Point;
@@ -20,7 +23,7 @@ use crate::twin::{ContactRules, Part, Twin};
 /// Arguments of `paws validate` for models that are not ours.
 #[derive(Debug, Clone, Default, Args)]
 pub struct ForeignArgs {
-    /// For a URDF or MJCF file: the recorded path of a point of the moved part in the model's world frame, as lines of
+    /// For a URDF or MJCF file, or joints: the recorded path of a point of the moved part in the file's world frame, as lines of
     /// x y z [qx qy qz qw] with or without a time stamp first; JOINT= says what it moved. May be repeated
     #[arg(long = "trajectory", value_name = "[JOINT=]FILE")]
     trajectories: Vec<String>,
@@ -46,7 +49,8 @@ impl ForeignArgs {
             return Ok(());
         }
         bail!(
-            "--trajectory, --action and --units belong to a URDF or MJCF file; a folder of `paws twin` has its own hands"
+            "--trajectory, --action and --units belong to a URDF or MJCF file or to joints; a folder of `paws twin` has its own \
+             hands"
         )
     }
 
@@ -93,13 +97,48 @@ pub fn load(path: &Path, args: &ForeignArgs) -> anyhow::Result<Loaded> {
     for note in &notes {
         eprintln!("{}: {note}", shown(path));
     }
-    for left in &twin.left_out {
-        eprintln!("{}: {} is left out: {}", shown(path), left.id, left.reason);
-    }
+    tell_left_out(path, &twin);
     let names: Vec<&str> = twin.furniture.iter().map(|f| f.part.label.as_str()).collect();
     if names.is_empty() {
         bail!("{}: no joint of it can be simulated (`paws check` says more)", shown(path));
     }
+    let frame = Frame { path, model: Some(&model), turn: UnitQuaternion::identity(), names };
+    let hands = hands(&frame, &twin, args)?;
+    Ok(Loaded { twin, rules, hands })
+}
+
+/// Joints that another program found, with the hands that moved them, both in the twin's frame: +Z up.
+pub fn load_joints(path: &Path, joints: &JointArgs, args: &ForeignArgs) -> anyhow::Result<(Twin, Vec<JointHands>)> {
+    let (twin, up) = joints.twin(path)?;
+    tell_left_out(path, &twin);
+    let names: Vec<&str> = twin.furniture.iter().map(|f| f.part.id.as_str()).collect();
+    if names.is_empty() {
+        bail!("{}: no joint of it can be built", shown(path));
+    }
+    let frame = Frame { path, model: None, turn: upright(&up)?, names };
+    let hands = hands(&frame, &twin, args)?;
+    Ok((twin, hands))
+}
+
+fn tell_left_out(path: &Path, twin: &Twin) {
+    for left in &twin.left_out {
+        eprintln!("{}: {} is left out: {}", shown(path), left.id, left.reason);
+    }
+}
+
+/// What the recorded paths are read against.
+struct Frame<'a> {
+    path: &'a Path,
+    model: Option<&'a model::Model>,
+    /// From the file's frame to the twin's.
+    turn: UnitQuaternion<f64>,
+    /// What the joints are called, in the twin's order.
+    names: Vec<&'a str>,
+}
+
+/// The recorded paths, each with the joint that it moved.
+fn hands(frame: &Frame<'_>, twin: &Twin, args: &ForeignArgs) -> anyhow::Result<Vec<JointHands>> {
+    let (path, names) = (frame.path, &frame.names);
     if args.trajectories.is_empty() {
         bail!(
             "{}: give recorded paths to replay, --trajectory [JOINT=]FILE; its joints: {}",
@@ -114,7 +153,10 @@ pub fn load(path: &Path, args: &ForeignArgs) -> anyhow::Result<Loaded> {
             Some((joint, file)) if !Path::new(argument).is_file() => (Some(joint), Path::new(file)),
             _ => (None, Path::new(argument.as_str())),
         };
-        let recorded = read(file, args)?;
+        let mut recorded = read(file, args)?;
+        for p in &mut recorded.positions {
+            *p = frame.turn * *p;
+        }
         let points = bare::robust(&recorded.positions);
         let index = match wanted {
             Some(name) => match twin.furniture.iter().position(|f| f.part.label == name || f.part.id == name) {
@@ -123,7 +165,7 @@ pub fn load(path: &Path, args: &ForeignArgs) -> anyhow::Result<Loaded> {
             },
             None if names.len() == 1 => 0,
             None => {
-                let (index, off) = moved::nearest(&twin, &points);
+                let (index, off) = moved::nearest(twin, &points);
                 eprintln!(
                     "{}: taken to move {}, whose motion is nearest ({:.1} cm, RMS); JOINT=FILE says otherwise",
                     shown(file),
@@ -134,7 +176,7 @@ pub fn load(path: &Path, args: &ForeignArgs) -> anyhow::Result<Loaded> {
             }
         };
         let part = &twin.furniture[index].part;
-        moved::check_place(file, &model, part, &points)?;
+        moved::check_place(file, frame.model, part, &points)?;
         let motion = match args.action(i)? {
             Some(action) => Motion { action, samples: points.len() },
             None => told(file, part, &points),
@@ -146,7 +188,7 @@ pub fn load(path: &Path, args: &ForeignArgs) -> anyhow::Result<Loaded> {
         let name = file.file_stem().map_or_else(|| shown(file), |s| s.to_string_lossy().into_owned());
         hands[index].clips.push((name, made));
     }
-    Ok(Loaded { twin, rules, hands })
+    Ok(hands)
 }
 
 /// Samples a second of a path without time stamps: a video's.

@@ -117,7 +117,7 @@ pub fn check_times(file: &Path, recorded: &BareTrajectory) -> anyhow::Result<()>
 
 /// Refuses a path that is nowhere near the part that it is said to have moved, and limits that the path shows to be radians
 /// which were read as degrees.
-pub fn check_place(file: &Path, model: &Model, part: &Part, points: &[Point]) -> anyhow::Result<()> {
+pub fn check_place(file: &Path, model: Option<&Model>, part: &Part, points: &[Point]) -> anyhow::Result<()> {
     // Between two of these openings a part moves by less than its own size.
     const STEPS: u32 = 12;
     let phi = part.joint.articulation;
@@ -143,8 +143,8 @@ pub fn check_place(file: &Path, model: &Model, part: &Part, points: &[Point]) ->
     // Half a turn in radians, taken for degrees; and a motion that is none of so few of them.
     let few = std::f64::consts::PI.to_radians();
     if phi.kind == JointKind::Revolute && part.joint.upper < few && range > 10.0 * part.joint.upper {
-        let why = match model.format {
-            Format::Mjcf { radian: false } => "the file's angles are degrees; write <compiler angle=\"radian\"/>",
+        let why = match model.map(|m| m.format) {
+            Some(Format::Mjcf { radian: false }) => "the file's angles are degrees; write <compiler angle=\"radian\"/>",
             _ => "are its limits degrees that were converted twice? they must be radians here",
         };
         bail!(

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::joints::{self, JointArgs};
 use super::output::write_file;
 use super::twin::{JointHands, as_hands};
 use super::{Answer, ConfigFile, foreign, print};
@@ -16,13 +17,16 @@ use crate::validation::{self, Verdict};
 
 #[derive(Debug, Args)]
 pub struct ValidateArgs {
-    /// The folder that `paws twin` wrote (twin.json and trajectories.json), or a URDF or MJCF file
+    /// The folder that `paws twin` wrote (twin.json and trajectories.json), a URDF or MJCF file, or joints found elsewhere
+    /// (docs/joints-format.md)
     twin: PathBuf,
     /// Write the report as JSON to this file
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     #[command(flatten)]
     foreign: foreign::ForeignArgs,
+    #[command(flatten)]
+    joints: JointArgs,
     #[command(flatten)]
     config: ConfigFile,
 }
@@ -32,6 +36,9 @@ pub fn run(args: &ValidateArgs) -> anyhow::Result<Answer> {
     let (twin, rules, in_order) = if foreign::is_model(&args.twin) {
         let foreign::Loaded { twin, rules, hands } = foreign::load(&args.twin, &args.foreign)?;
         (twin, Some(rules), hands)
+    } else if joints::is_joints(&args.twin) {
+        let (twin, hands) = foreign::load_joints(&args.twin, &args.joints, &args.foreign)?;
+        (twin, None, hands)
     } else {
         args.foreign.refuse()?;
         let (twin, hands) = ours(&args.twin)?;

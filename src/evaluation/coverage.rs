@@ -71,11 +71,11 @@ mod tests {
             origin: Point::origin(),
             origin_handle: Point::origin(),
             moved: 1.0,
-            part_box: OrientedBox {
+            part_box: Some(OrientedBox {
                 center: Point::new(0.2, 0.0, 0.0),
                 half: Vector::new(0.2, 0.01, 0.3),
                 rotation: nalgebra::Matrix3::identity(),
-            },
+            }),
             base_box: None,
             handle: None,
             noun: None,

@@ -40,10 +40,11 @@ pub struct Measured {
     pub line_to_line_coarse_m: Option<f64>,
     /// The same, parallel only where the sine is zero.
     pub line_to_line_unguarded_m: Option<f64>,
-    /// Diagonal of the box around furniture and part in the furniture's axes, metres; the part's own without furniture.
-    pub object_diagonal_m: f64,
+    /// Diagonal of the box around furniture and part in the furniture's axes, metres; the part's own without furniture; none
+    /// where the truth has no box of the part.
+    pub object_diagonal_m: Option<f64>,
     /// Diagonal of the true part's box, metres.
-    pub part_diagonal_m: f64,
+    pub part_diagonal_m: Option<f64>,
     /// Difference between the ranges moved, rad or m; none where the types differ.
     pub range_error: Option<f64>,
     /// Length of the difference between axis times range of both, rad or m; none where the types differ.
@@ -76,6 +77,7 @@ pub fn measure(prediction: &Prediction, truth: &TrueClip) -> Option<Measured> {
     let range = prediction.range.filter(|_| type_right);
     let turns = type_right && kind == JointKind::Revolute;
     let said = prediction.uncertainty.as_ref().filter(|_| type_right);
+    let boxes = prediction.part_box.as_ref().zip(truth.part_box.as_ref());
     Some(Measured {
         type_right,
         kind: truth.kind,
@@ -90,10 +92,10 @@ pub fn measure(prediction: &Prediction, truth: &TrueClip) -> Option<Measured> {
         line_to_line_coarse_m: line_to_line(1e-3),
         line_to_line_unguarded_m: line_to_line(0.0),
         object_diagonal_m: truth
-            .base_box
+            .part_box
             .as_ref()
-            .map_or_else(|| diagonal(&truth.part_box), |base| common_diagonal(base, &truth.part_box)),
-        part_diagonal_m: diagonal(&truth.part_box),
+            .map(|part| truth.base_box.as_ref().map_or_else(|| diagonal(part), |base| common_diagonal(base, part))),
+        part_diagonal_m: truth.part_box.as_ref().map(diagonal),
         range_error: range.map(|r| (r - truth.moved).abs()),
         motion_difference: range.map(|r| (axis * r - truth.axis * truth.moved).norm()),
         radius_error_m: truth
@@ -101,13 +103,13 @@ pub fn measure(prediction: &Prediction, truth: &TrueClip) -> Option<Measured> {
             .zip(predicted_line)
             .filter(|_| turns)
             .map(|(handle, line)| (line.distance(&handle) - true_line.distance(&handle)).abs()),
-        box_iou: prediction.part_box.as_ref().map(|b| {
+        box_iou: boxes.map(|(b, part)| {
             let thick = 0.05;
-            crate::twin::box_iou(&b.thickened(thick), &truth.part_box.thickened(thick))
+            crate::twin::box_iou(&b.thickened(thick), &part.thickened(thick))
         }),
-        box_edge_m: prediction.part_box.as_ref().map(|b| {
-            let [low, high] = extent(&truth.part_box, b);
-            (low + truth.part_box.half).amax().max((high - truth.part_box.half).amax())
+        box_edge_m: boxes.map(|(b, part)| {
+            let [low, high] = extent(part, b);
+            (low + part.half).amax().max((high - part.half).amax())
         }),
         axis_sigmas: said.and_then(|u| {
             let turn = turn_onto(&axis, &truth.axis);
@@ -256,9 +258,13 @@ impl Rule {
             ),
             Self::OpdMulti => (
                 m.axis_rad <= 10f64.to_radians(),
-                m.predicted_kind == JointKind::Prismatic || within(m.origin_to_line_m, 0.25 * m.object_diagonal_m),
+                m.predicted_kind == JointKind::Prismatic
+                    || m.object_diagonal_m.is_some_and(|d| within(m.origin_to_line_m, 0.25 * d)),
             ),
-            Self::S2o => (m.axis_rad < 5f64.to_radians(), slide || below(m.origin_to_line_m, 0.1 * m.part_diagonal_m)),
+            Self::S2o => (
+                m.axis_rad < 5f64.to_radians(),
+                slide || m.part_diagonal_m.is_some_and(|d| below(m.origin_to_line_m, 0.1 * d)),
+            ),
             Self::ArticulateAnything => {
                 let origin = if slide { m.point_to_point_m } else { m.line_to_line_m };
                 let placed = within(origin.map(|d| 0.5 * (d + m.axis_rad)), 0.05);
@@ -357,11 +363,11 @@ mod tests {
             origin_handle: Point::new(0.0, 0.0, 0.5),
             moved: 1.0,
             // 0.72 m from corner to corner.
-            part_box: OrientedBox {
+            part_box: Some(OrientedBox {
                 center: Point::new(0.2, 0.0, 1.0),
                 half: Vector::new(0.2, 0.01, 0.3),
                 rotation: nalgebra::Matrix3::identity(),
-            },
+            }),
             // Behind the part; 0.95 m from corner to corner together with it.
             base_box: Some(OrientedBox {
                 center: Point::new(0.2, 0.31, 1.0),
@@ -513,7 +519,7 @@ mod tests {
     fn radius_box_and_range_are_measured_on_the_true_part() {
         let mut answer = prediction(JointKind::Revolute, Vector::z(), Point::new(0.05, 0.0, 1.0));
         answer.range = Some(1.3);
-        let mut part = truth(JointKind::Revolute).part_box;
+        let mut part = truth(JointKind::Revolute).part_box.unwrap();
         part.half.x += 0.02;
         part.center.x += 0.05;
         answer.part_box = Some(part);
@@ -521,6 +527,16 @@ mod tests {
         assert!((m.radius_error_m.unwrap() - 0.05).abs() < 1e-12);
         assert!((m.box_edge_m.unwrap() - 0.07).abs() < 1e-12, "{m:?}");
         assert!((m.range_error.unwrap() - 0.3).abs() < 1e-12 && !range_serves(&m));
-        assert!((m.part_diagonal_m - 0.7213).abs() < 1e-3 && (m.object_diagonal_m - 0.9510).abs() < 1e-3, "{m:?}");
+        let [part, object] = [m.part_diagonal_m, m.object_diagonal_m].map(Option::unwrap);
+        assert!((part - 0.7213).abs() < 1e-3 && (object - 0.9510).abs() < 1e-3, "{m:?}");
+    }
+
+    #[test]
+    fn without_the_parts_box_only_the_rules_that_need_it_say_no() {
+        let truth = TrueClip { part_box: None, ..truth(JointKind::Revolute) };
+        let m = measure(&prediction(JointKind::Revolute, Vector::z(), Point::new(0.0, 0.0, 1.0)), &truth).unwrap();
+        let wrong: Vec<Rule> = Rule::ALL.into_iter().filter(|r| !r.judge(&m)[2]).collect();
+        assert_eq!(wrong, [Rule::OpdMulti, Rule::S2o]);
+        assert!(m.part_diagonal_m.is_none() && m.box_iou.is_none());
     }
 }

@@ -385,11 +385,11 @@ mod tests {
             origin: Point::new(x, 0.0, 0.0),
             origin_handle: Point::new(x, 0.0, 0.0),
             moved: 1.0,
-            part_box: OrientedBox {
+            part_box: Some(OrientedBox {
                 center: Point::new(x + 0.2, 0.0, 0.0),
                 half: Vector::new(0.2, 0.01, 0.3),
                 rotation: nalgebra::Matrix3::identity(),
-            },
+            }),
             base_box: None,
             handle: None,
             noun: Some("cupboard".to_owned()),

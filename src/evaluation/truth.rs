@@ -212,8 +212,8 @@ pub struct TrueClip {
     pub origin_handle: Point,
     /// Opening that the clip went through, rad or m.
     pub moved: f64,
-    /// Box of the moving part, closed.
-    pub part_box: OrientedBox,
+    /// Box of the moving part, closed; `None` where the truth has no shapes.
+    pub part_box: Option<OrientedBox>,
     /// Box of the furniture without its moving parts.
     pub base_box: Option<OrientedBox>,
     /// The handle when closed.
@@ -304,7 +304,7 @@ impl Truth {
                 origin: joint.origin,
                 origin_handle: joint.origin_handle,
                 moved: if high >= low { high - low } else { 0.0 },
-                part_box: joint.part_box,
+                part_box: Some(joint.part_box),
                 base_box: joint.base_box,
                 handle: joint.handle_closed,
                 noun: joint.noun.clone(),

@@ -3,6 +3,7 @@
 //! All formats share one set of frames: a part's link sits at its joint's origin with the world's axes, a base and the
 //! room at the world's origin. Boxes keep their own orientation.
 
+pub mod annotations;
 pub mod gltf;
 pub mod mjcf;
 pub mod urdf;

@@ -252,8 +252,11 @@ impl Frame {
 
 const HINT: &str = "are these millimetres or centimetres? (\"units\": \"mm\" or \"cm\")";
 
-/// The turn that brings a direction to +Z.
-fn upright(up: &Vector) -> Result<UnitQuaternion<f64>> {
+/// The turn that brings a direction to +Z: how a twin lies in its file's frame.
+///
+/// # Errors
+/// Where it is no direction.
+pub fn upright(up: &Vector) -> Result<UnitQuaternion<f64>> {
     let Some(up) = unit(up) else {
         return Err(Error::Export("up: is no direction".to_owned()));
     };

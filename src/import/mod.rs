@@ -12,6 +12,7 @@
 //!
 //! Axes change in [`axes`], joint orders in [`joints`], pixels in [`warp`], lenses in [`optics`], and nowhere else.
 
+pub mod articulations;
 pub mod axes;
 pub mod blob;
 pub mod capture;
@@ -22,6 +23,7 @@ pub mod join;
 pub mod joints;
 pub mod names;
 pub mod optics;
+pub mod ply;
 pub mod poses;
 pub mod report;
 pub mod text;

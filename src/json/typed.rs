@@ -6,10 +6,13 @@ use serde::de::value::StrDeserializer;
 use serde::de::{self, DeserializeOwned, DeserializeSeed, Deserializer, MapAccess, SeqAccess, Unexpected, Visitor};
 use serde_json::Value;
 
+/// The place of a fault that is the value's own.
+pub(super) const WHOLE: &str = "the whole file";
+
 /// The first place where `value` is no `T`, and what is wrong there; `None` where it is one.
 pub(super) fn explain<T: DeserializeOwned>(value: &Value) -> Option<(String, String)> {
     let fault = <T as serde::Deserialize<'_>>::deserialize(Node { value, place: &Place::Top }).err()?;
-    let place = fault.place.filter(|p| !p.is_empty()).unwrap_or_else(|| "the whole file".to_owned());
+    let place = fault.place.filter(|p| !p.is_empty()).unwrap_or_else(|| WHOLE.to_owned());
     Some((place, fault.message))
 }
 

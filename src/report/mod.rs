@@ -3,6 +3,7 @@
 pub mod accuracy;
 pub mod files;
 pub mod page;
+pub mod parts;
 pub mod pictures;
 pub mod table;
 pub mod words;
