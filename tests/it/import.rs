@@ -574,3 +574,43 @@ fn the_formats_are_listed() {
     }
     assert_eq!(out.status.code(), Some(0));
 }
+
+/// A right source under a wrong option: the options that undo it are named, and `--fix` sets them.
+#[test]
+fn wrong_conventions_of_three_formats_are_named_and_corrected() {
+    let dir = tempfile::tempdir().unwrap();
+    let stray = write_stray(&dir.path().join("stray"));
+    let tum = write_tum(&dir.path().join("tum"), true);
+    write_colmap(&dir.path().join("colmap"), true, 2.5);
+    write_tum(&dir.path().join("depth"), false);
+    for (sources, truth, wrong, option) in [
+        (&["stray"][..], Some(&stray), &["--poses", "camera-from-world"][..], "--poses world-from-camera"),
+        (&["stray"], Some(&stray), &["--camera-axes", "opengl"], "--camera-axes opencv"),
+        (&["stray"], Some(&stray), &["--quaternion", "wxyz"], "--quaternion xyzw"),
+        (&["stray"], Some(&stray), &["--unit", "0.001"], "--unit "),
+        (&["stray"], None, &["--up", "z"], "--up y"),
+        (&["tum"], None, &["--poses", "camera-from-world", "--up", "z"], "--poses world-from-camera"),
+        (&["tum"], None, &["--camera-axes", "opengl", "--up", "z"], "--camera-axes opencv"),
+        (&["tum"], None, &["--up", "y"], "--up z"),
+        (&["tum"], None, &["--unit", "0.4", "--up", "z"], "--unit "),
+        (&["colmap", "depth"], None, &["--poses", "world-from-camera", "--scale", "2.5"], "--poses camera-from-world"),
+        (&["colmap", "depth"], None, &["--scale", "1"], "--scale "),
+    ] {
+        let mut args = vec!["import"];
+        args.extend(sources);
+        args.extend(wrong);
+        args.extend(["--fps", "0", "--out", "out"]);
+        let out = paws(&args, dir.path());
+        let text = String::from_utf8_lossy(&out.stdout).into_owned();
+        assert_eq!(out.status.code(), Some(1), "{args:?}: {text}{}", stderr(&out));
+        assert!(text.contains("doubtful") && text.contains(option), "{args:?}: {text}");
+        let Some(truth) = truth.filter(|_| !wrong.contains(&"--unit")) else { continue };
+        args.push("--fix");
+        let out = paws(&args, dir.path());
+        let text = String::from_utf8_lossy(&out.stdout).into_owned();
+        assert!(text.contains("corrected by") && out.status.code() == Some(0), "{args:?}: {text}{}", stderr(&out));
+        let (m, deg) = apart(truth, &poses(&dir.path().join("out")));
+        assert!(m < 1e-6 && deg < 1e-4, "{args:?}: {m} m, {deg} degrees");
+    }
+    assert_eq!(tum.len(), FRAMES);
+}

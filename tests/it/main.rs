@@ -6,6 +6,7 @@ mod accuracy;
 mod bad_input;
 mod bare_trajectories;
 mod common;
+mod conventions;
 mod floors;
 mod foreign;
 mod formats;
