@@ -36,7 +36,7 @@ impl Door {
         };
         let mut found = findings(&Subject::of(&recording));
         for _ in 0..ROUNDS {
-            if !self.fix || !found.iter().any(|f| f.is_certain() && f.fix.is_some()) {
+            if !self.fix || !found.iter().any(Finding::can_be_fixed) {
                 break;
             }
             let (next, done) = repaired(recording, &found);

@@ -223,8 +223,7 @@ fn fixed(captures: &[Capture], mut options: Options) -> anyhow::Result<Imported>
     let mut done = Vec::new();
     let mut imported = assemble(captures.to_vec(), &options)?;
     for _ in 0..ROUNDS {
-        let certain: Vec<_> =
-            imported.report.findings.iter().filter(|f| f.certain && !f.changes.is_empty()).cloned().collect();
+        let certain: Vec<_> = imported.report.findings.iter().filter(|f| f.can_be_fixed).cloned().collect();
         if certain.is_empty() {
             break;
         }

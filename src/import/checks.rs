@@ -24,6 +24,9 @@ pub struct Finding {
     pub option: String,
     /// Whether it is beyond doubt.
     pub certain: bool,
+    /// Whether the option is beyond doubt, too.
+    #[serde(skip)]
+    pub can_be_fixed: bool,
     /// The same options as changes; none where no option sets it right.
     #[serde(skip)]
     pub changes: Vec<Change>,
@@ -102,6 +105,11 @@ fn posed(imported: &Imported) -> Option<&Capture> {
     imported.captures.iter().find(|c| c.poses.as_ref().is_some_and(|p| !p.items.is_empty()))
 }
 
+/// Up in the source's world made right-handed, which the recording's world was turned by.
+fn declared_up(imported: &Imported) -> Vector {
+    imported.report.up.as_ref().map_or_else(Vector::z, |up| Vector::from(up.direction))
+}
+
 /// How the numbers of a pose in a file are read, all lengths in metres already.
 fn convention(imported: &Imported, posed: &Capture) -> Convention {
     // Quaternions are written x y z w here, whatever the file has.
@@ -139,7 +147,9 @@ fn subject<'a>(imported: &'a Imported, posed: &Capture) -> Subject<'a> {
 fn readings(imported: &Imported, posed: &Capture) -> Vec<(Reading, Vec<Pose>)> {
     let (convention, order) = (convention(imported, posed), order(imported, posed));
     let scale = imported.report.scale.as_ref().map_or(1.0, |s| s.metres_per_unit);
-    let turned = Pose::from_parts(Vector::zeros().into(), imported.view.source_from_output);
+    let rotated = |turn| Pose::from_parts(Vector::zeros().into(), turn);
+    let turned = rotated(imported.view.source_from_output);
+    let world = rotated(upright(&declared_up(imported)));
     let raw: Vec<Pose> = imported
         .frames
         .iter()
@@ -153,7 +163,7 @@ fn readings(imported: &Imported, posed: &Capture) -> Vec<(Reading, Vec<Pose>)> {
         Reading::WLast => order == Some(QuaternionOrder::Wxyz),
         _ => true,
     };
-    let again = |p: &Pose| Some(convention.world_from_camera(&RawPose::from_pose(p))? * turned);
+    let again = |p: &Pose| Some(world * convention.world_from_camera(&RawPose::from_pose(p))? * turned);
     readings_of(&raw)
         .into_iter()
         .filter(|(kind, _)| is_possible(*kind))
@@ -169,7 +179,8 @@ fn in_options(found: conventions::Finding, imported: &Imported, posed: &Capture,
     } else {
         changes.iter().map(Change::words).collect::<Vec<_>>().join(" ")
     };
-    Finding { certain: found.is_certain(), what: found.what, evidence: found.evidence, option, changes }
+    let (certain, can_be_fixed) = (found.is_certain(), found.can_be_fixed() && !changes.is_empty());
+    Finding { what: found.what, evidence: found.evidence, option, certain, can_be_fixed, changes }
 }
 
 /// A fix as changes of options; `None` where no option does it.
@@ -191,13 +202,12 @@ fn changes(fix: &Fix, imported: &Imported, posed: &Capture, subject: &Subject) -
             out.extend(other_axes(axes, imported, &convention)?);
             Some(out)
         }
-        Fix::Scale(factor) => Some(vec![match &imported.report.scale {
+        Fix::Scale { factor, .. } => Some(vec![match &imported.report.scale {
             Some(scale) => Change::Scale(scale.metres_per_unit * factor),
             None => Change::Unit(convention.unit_m * factor),
         }]),
         Fix::Up(up) => {
-            let declared = imported.report.up.as_ref().map_or(Vector::z(), |u| Vector::from(u.direction));
-            let source = convention.source_vector(&(upright(&declared).inverse() * up));
+            let source = convention.source_vector(&(upright(&declared_up(imported)).inverse() * up));
             let at = source.iamax();
             let mut axis = Vector::zeros();
             axis[at] = source[at].signum();
@@ -249,6 +259,7 @@ fn palm(imported: &Imported) -> Option<Finding> {
         ),
         option: "--unit METRES for hands in the poses' world, else convert the hands".to_owned(),
         certain: false,
+        can_be_fixed: false,
         changes: Vec::new(),
     })
 }

@@ -4,14 +4,18 @@ use nalgebra::Matrix3;
 use rayon::prelude::*;
 
 use super::agreement::student;
-use super::looks::{Look, spread};
+use super::looks::Look;
 use super::reading::axes;
 use super::{Finding, Fix, LIKELY_NATS, Subject};
 use crate::math::{Point, Pose, Vector, stats};
 use crate::recording::{Grid, HAND_CLASS};
 
-/// Masks that are decoded.
-const MASKS: usize = 40;
+/// Masks that are decoded at the most: all of a short recording, else stretches, in which each hand meets the masks before and
+/// after its own.
+const MASKS: usize = 200;
+const STRETCHES: usize = 5;
+/// Differences of one frame that count as independent: a hand stays where it is for some frames.
+const INDEPENDENT: f64 = 0.25;
 /// Frames by which hands could be late or early at the most.
 const MOST_LAG: i64 = 15;
 /// A lag below is harmless, frames.
@@ -101,7 +105,7 @@ fn witnesses<'a>(subject: &Subject, looks: &'a [Look]) -> Vec<Witness<'a>> {
         subject.hands.get(first).is_some_and(|h| h.0 <= frame.saturating_add(most))
     };
     let wanted: Vec<usize> = subject.with_mask.iter().copied().filter(near).collect();
-    let masks: Vec<Witness> = spread(&wanted, MASKS)
+    let masks: Vec<Witness> = stretches(&wanted)
         .into_par_iter()
         .filter_map(|frame| Some(Witness { frame, sight: Sight::Mask((subject.mask)(frame)?) }))
         .collect();
@@ -111,6 +115,21 @@ fn witnesses<'a>(subject: &Subject, looks: &'a [Look]) -> Vec<Witness<'a>> {
         return masks;
     }
     looks.iter().filter(|l| near(&l.frame)).map(|l| Witness { frame: l.frame, sight: Sight::Depth(l) }).collect()
+}
+
+/// All of a short list; of a long one evenly spread stretches.
+fn stretches(all: &[usize]) -> Vec<usize> {
+    if all.len() <= MASKS {
+        return all.to_vec();
+    }
+    let length = MASKS / STRETCHES;
+    let last = all.len() - length;
+    (0..STRETCHES)
+        .flat_map(|i| all.iter().skip(i * last / (STRETCHES - 1)).take(length))
+        .copied()
+        .collect::<std::collections::BTreeSet<usize>>()
+        .into_iter()
+        .collect()
 }
 
 /// Whether a frame sees a hand at a place: hand pixels there, or depth within this ratio of the hand's.
@@ -168,10 +187,10 @@ fn mean(shares: &[Option<f64>]) -> f64 {
     stats::mean(&known).unwrap_or(0.0)
 }
 
-/// Log odds that hands are seen better in one way than in another, of frames that tell both; half of them are independent.
+/// Log odds that hands are seen better in one way than in another, of frames that tell both.
 fn nats(better: &[Option<f64>], worse: &[Option<f64>]) -> f64 {
     let differences: Vec<f64> = better.iter().zip(worse).filter_map(|(a, b)| Some((*a)? - (*b)?)).collect();
-    if differences.len() < LEAST { 0.0 } else { student(&differences, 0.5 * differences.len() as f64) }
+    if differences.len() < LEAST { 0.0 } else { student(&differences, INDEPENDENT * differences.len() as f64) }
 }
 
 /// What a share is of.

@@ -39,7 +39,7 @@ pub(super) fn looks(subject: &Subject) -> Vec<Look> {
 }
 
 /// At the most so many of a list, evenly spread, both ends among them.
-pub(super) fn spread(all: &[usize], most: usize) -> Vec<usize> {
+fn spread(all: &[usize], most: usize) -> Vec<usize> {
     if all.len() <= most || most < 2 {
         return all.iter().copied().take(most).collect();
     }

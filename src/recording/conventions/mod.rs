@@ -50,6 +50,12 @@ impl Finding {
         self.nats >= CERTAIN_NATS
     }
 
+    /// Whether it can be set right without asking: it is beyond doubt, and so is what sets it right.
+    #[must_use]
+    pub fn can_be_fixed(&self) -> bool {
+        self.is_certain() && !matches!(self.fix, None | Some(Fix::Scale { is_unit: false, .. }))
+    }
+
     /// One sentence for people, without the remedy.
     #[must_use]
     pub fn sentence(&self) -> String {
@@ -69,7 +75,12 @@ pub enum Fix {
         axes: Matrix3<f64>,
     },
     /// Camera positions are multiplied.
-    Scale(f64),
+    Scale {
+        /// By this.
+        factor: f64,
+        /// Whether it is exact, a unit's; else depth tells it to a tenth, which is no correction.
+        is_unit: bool,
+    },
     /// This direction of the world is up (unit length).
     Up(Vector),
     /// The pose of frame `i + n` belongs to frame `i`.

@@ -14,6 +14,8 @@ const SCALES: [f64; 26] = [
     0.001, 0.01, 0.0254, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3048, 0.4, 0.5, 0.6, 0.72, 0.85, 1.18, 1.4, 1.7, 2.0, 2.5, 3.28,
     5.0, 7.0, 10.0, 39.37, 100.0, 1000.0,
 ];
+/// Factors between units that people use, and those that are left when one is halved or counted in fives.
+const UNITS: [f64; 14] = [0.001, 0.01, 0.0254, 0.1, 0.2, 0.3048, 0.5, 2.0, 3.2808, 5.0, 10.0, 39.37, 100.0, 1000.0];
 /// Scales that are told. Within, it is the depth that is off as estimated depth is, which is corrected later.
 const RIGHT_SCALE: std::ops::Range<f64> = 0.67..1.5;
 /// Frames by which poses could be late or early. Two do no harm.
@@ -172,7 +174,17 @@ fn scaled<'a>(board: &Board, of: Rated<'a>) -> Rated<'a> {
     let best = best_scale(board, board.rate(of.reading, of.candidate));
     let is_off = !RIGHT_SCALE.contains(&best.candidate.scale);
     let plain = board.rate(of.reading, Candidate { scale: 1.0, ..of.candidate });
-    if is_off && board.gain(&best, &plain) > LADDER_NATS + LIKELY_NATS { best } else { of }
+    if !is_off || board.gain(&best, &plain) <= LADDER_NATS + LIKELY_NATS {
+        return of;
+    }
+    // Depth tells a scale to a tenth or two; people mix up units by whole factors.
+    let near = best.candidate.scale;
+    let by_distance = |a: &f64, b: &f64| (a / near).ln().abs().total_cmp(&(b / near).ln().abs());
+    let Some(unit) = UNITS.into_iter().min_by(by_distance).filter(|unit| (unit / near).ln().abs() < 0.2) else {
+        return best;
+    };
+    let snapped = board.rate(of.reading, Candidate { scale: unit, ..of.candidate });
+    if board.gain(&best, &snapped) < LIKELY_NATS { snapped } else { best }
 }
 
 /// With the lag that fits, where there is one.
@@ -270,7 +282,7 @@ fn told_scale(board: &Board, subject: &Subject, best: &Rated) -> Option<Finding>
         remedy,
         nats: board.gain(best, &plain) - LADDER_NATS,
         ruinous: true,
-        fix: (!is_depth).then_some(Fix::Scale(scale)),
+        fix: (!is_depth).then(|| Fix::Scale { factor: scale, is_unit: UNITS.contains(&scale) }),
     })
 }
 

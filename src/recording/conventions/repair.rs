@@ -11,7 +11,7 @@ use crate::recording::Recording;
 #[must_use]
 pub fn repaired(mut recording: Recording, findings: &[Finding]) -> (Recording, Vec<String>) {
     let mut done = Vec::new();
-    for finding in findings.iter().filter(|f| f.is_certain()) {
+    for finding in findings.iter().filter(|f| f.can_be_fixed()) {
         if let Some(fix) = &finding.fix {
             apply(&mut recording, fix);
             done.push(format!("{}: {}", finding.what, finding.remedy));
@@ -27,7 +27,7 @@ fn apply(recording: &mut Recording, fix: &Fix) {
                 frame.world_from_camera = with_axes(&reading.of(&frame.world_from_camera), axes);
             }
         }
-        Fix::Scale(factor) => {
+        Fix::Scale { factor, .. } => {
             for frame in &mut recording.frames {
                 frame.world_from_camera.translation.vector *= *factor;
             }
