@@ -7,7 +7,7 @@ use super::looks::Look;
 use crate::math::{Pose, Vector};
 
 /// Pairs of looks that are compared at the most: more hardly tell more, and all readings are asked about each.
-const PAIRS: usize = 240;
+const PAIRS: usize = 200;
 /// Looks that are turned against each other by more hardly see one place, radians. Every reading has the same angle.
 const TURN: f64 = 0.7;
 

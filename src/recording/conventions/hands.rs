@@ -27,6 +27,8 @@ const LEAST: usize = 8;
 /// What the best of some readings or lags gains by chance, nats: there are some 60 readings; neighbouring lags say the same.
 const CHANCE_NATS: f64 = 4.1;
 const LAG_NATS: f64 = 1.0;
+/// Right hands are seen where they are more often than this.
+const RIGHT: f64 = 0.5;
 /// Distances of a hand from the head, metres, with room for errors.
 const REACH_M: std::ops::Range<f64> = 0.05..2.5;
 
@@ -77,10 +79,8 @@ pub(super) fn judge(subject: &Subject, looks: &[Look]) -> Vec<Finding> {
     if witnesses.len() < LEAST {
         return out;
     }
-    match misread(subject, &witnesses) {
-        Some(finding) => out.push(finding),
-        None => out.extend(late(subject, &witnesses)),
-    }
+    // Hands of another time are not where they are seen either: where a lag explains it, nothing else is asked.
+    out.extend(late(subject, &witnesses).or_else(|| misread(subject, &witnesses)));
     out
 }
 
@@ -205,8 +205,6 @@ fn kind(witnesses: &[Witness]) -> &'static str {
 fn misread(subject: &Subject, witnesses: &[Witness]) -> Option<Finding> {
     /// Depth beside a hand is within this ratio of the hand's: the wall behind it, a counter before it.
     const RATIO: f64 = 2.0;
-    /// Right hands are seen more often than this.
-    const RIGHT: f64 = 0.5;
     /// Hands that are nowhere to be seen under any meaning.
     const LOST: f64 = 0.25;
     let declared = shares(subject, witnesses, 0, RATIO, None);
@@ -316,7 +314,7 @@ fn late(subject: &Subject, witnesses: &[Witness]) -> Option<Finding> {
         .filter(|(_, s)| s.iter().flatten().count() >= LEAST)
         .max_by(|a, b| mean(&a.1).total_cmp(&mean(&b.1)).then(b.0.abs().cmp(&a.0.abs())))?;
     let gain = nats(&best, &now) - LAG_NATS;
-    if lag.abs() < LEAST_LAG || mean(&now) > NEARLY * mean(&best) || gain < LIKELY_NATS {
+    if lag.abs() < LEAST_LAG || mean(&best) < RIGHT || mean(&now) > NEARLY * mean(&best) || gain < LIKELY_NATS {
         return None;
     }
     let secs = lag as f64 * period(&subject.secs);

@@ -26,6 +26,8 @@ const CHANCE_NATS: f64 = 5.8;
 const LADDER_NATS: f64 = 1.0;
 /// A reading is another one only if it explains this many times as many places.
 const CLEARLY: f64 = 1.2;
+/// Poses in the right unit explain this many times as many places as half of all readings.
+const WELL: f64 = 2.0;
 /// Looks and pairs that are needed to judge.
 const LEAST: usize = 6;
 /// Where the looks are turned against each other by less, nothing is told, radians: 2 degrees.
@@ -77,7 +79,7 @@ pub(super) fn judge(subject: &Subject, looks: &[Look]) -> Judged {
     let declared = board.rate(Reading::Declared, plain);
     let at_rest = at_scale(&board, subject, 1.0);
     let others = stats::median(&at_rest.iter().map(|r| r.mean).collect::<Vec<_>>()).unwrap_or(0.0);
-    let best = turned(&board, subject, &declared, at_rest);
+    let best = turned(&board, subject, &declared, at_rest, others);
     let best = scaled(&board, best);
     let best = late(&board, best);
     let mut findings = Vec::new();
@@ -117,7 +119,14 @@ fn best_of<'a>(board: &Board, all: Vec<Rated<'a>>) -> Option<Rated<'a>> {
 }
 
 /// The best reading and axes. Where the unit is so wrong that none fits, rotations alone are compared, then units.
-fn turned<'a>(board: &Board, subject: &'a Subject, declared: &Rated<'a>, at_one: Vec<Rated<'a>>) -> Rated<'a> {
+/// `others`: the median share of all readings.
+fn turned<'a>(
+    board: &Board,
+    subject: &'a Subject,
+    declared: &Rated<'a>,
+    at_one: Vec<Rated<'a>>,
+    others: f64,
+) -> Rated<'a> {
     let again = |r: &Rated<'a>| board.rate(r.reading, r.candidate);
     let clearly = |better: &Rated, worse: &Rated| {
         better.mean > CLEARLY * worse.mean && board.gain(better, worse) > CHANCE_NATS + LIKELY_NATS
@@ -126,6 +135,9 @@ fn turned<'a>(board: &Board, subject: &'a Subject, declared: &Rated<'a>, at_one:
     // A wrong unit alone must not look like wrong axes.
     let rival = best_scale(board, again(declared));
     let best = if clearly(&best, declared) && clearly(&best, &rival) { best } else { again(declared) };
+    if best.mean > WELL * others {
+        return best;
+    }
     let Some(still) = best_of(board, at_scale(board, subject, 0.0)) else { return best };
     if still.mean <= best.mean {
         return best;

@@ -101,7 +101,7 @@ pub(super) fn axes() -> Vec<Matrix3<f64>> {
     ];
     let signs = all.clone();
     for [a, b, c] in [[0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
-        let mut permuted = Matrix3::zeros();
+        let mut permuted: Matrix3<f64> = Matrix3::zeros();
         for (row, column) in [a, b, c].into_iter().enumerate() {
             permuted[(row, column)] = 1.0;
         }
@@ -137,7 +137,7 @@ pub(super) fn is_opengl(axes: &Matrix3<f64>) -> bool {
 
 /// A pose whose camera has these axes, as one of an OpenCV camera. A mirror image is mirrored as a whole: the world's x, too.
 pub(super) fn with_axes(pose: &Pose, axes: &Matrix3<f64>) -> Pose {
-    let mut world = Matrix3::identity();
+    let mut world: Matrix3<f64> = Matrix3::identity();
     if axes.determinant() < 0.0 {
         world[(0, 0)] = -1.0;
     }
