@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::door::Door;
 use super::{Answer, Opening, twin};
 use crate::config::Config;
 
@@ -22,6 +23,6 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Answer> {
     eprintln!("rendering a recording of a kitchen into {} ...", recording.display());
     super::synth::write(&crate::synth::Options { seed: SEED, width: 480, parts: 6, ..Default::default() }, &recording)?;
     eprintln!("making its twin ...");
-    let given = twin::Given { recording: &recording, opening: Opening::default() };
+    let given = twin::Given { recording: &recording, opening: Opening::default(), door: Door::default() };
     twin::make(given, &twin, &Config::default(), true, None)
 }

@@ -32,8 +32,14 @@ pub struct ImportArgs {
     #[arg(long)]
     list: bool,
     /// Folder for the recording
-    #[arg(long, value_name = "DIR", required_unless_present = "list")]
+    #[arg(long, value_name = "DIR", required_unless_present_any = ["list", "check"])]
     out: Option<PathBuf>,
+    /// Set the options that certainly are right where the poses, hands or clocks as declared contradict each other
+    #[arg(long)]
+    fix: bool,
+    /// Write nothing: say what of the given recordings (folders of ours) contradicts itself, and what sets it right
+    #[arg(long, conflicts_with_all = ["out", "fix"])]
+    check: bool,
     #[command(flatten)]
     frames: FrameArgs,
     #[command(flatten)]
@@ -188,6 +194,9 @@ pub fn run(args: &ImportArgs) -> anyhow::Result<Answer> {
         print(&list())?;
         return Ok(Answer::Yes);
     }
+    if args.check {
+        return super::door::check(&args.sources);
+    }
     let Some(out) = &args.out else { bail!("--out DIR is needed") };
     let options = args.options()?;
     let sources = resolve(&args.sources)?;
@@ -199,12 +208,33 @@ pub fn run(args: &ImportArgs) -> anyhow::Result<Answer> {
         steps.report("reading", i, sources.len());
         captures.push((format.read)(path, &options)?);
     }
-    let mut imported = assemble(captures, &options)?;
+    let mut imported = if args.fix { fixed(&captures, options)? } else { assemble(captures, &options)? };
     write(&mut imported, &output, &steps)?;
     steps.finish();
     output.finish()?;
     print(&told(&imported, out))?;
     Ok(if imported.report.findings.is_empty() { Answer::Yes } else { Answer::No })
+}
+
+/// The recording under the options that its own findings ask for, where they are certain.
+fn fixed(captures: &[Capture], mut options: Options) -> anyhow::Result<Imported> {
+    /// Corrections may uncover what they hid: up, after poses that were inverted.
+    const ROUNDS: usize = 3;
+    let mut done = Vec::new();
+    let mut imported = assemble(captures.to_vec(), &options)?;
+    for _ in 0..ROUNDS {
+        let certain: Vec<_> = imported.report.findings.iter().filter(|f| f.can_be_fixed).cloned().collect();
+        if certain.is_empty() {
+            break;
+        }
+        for finding in certain {
+            finding.changes.iter().for_each(|change| change.apply(&mut options));
+            done.push(format!("corrected by {}: {}: {}", finding.option, finding.what, finding.evidence));
+        }
+        imported = assemble(captures.to_vec(), &options)?;
+    }
+    imported.report.changes.extend(done);
+    Ok(imported)
 }
 
 /// Writes images, then the tables that name them.

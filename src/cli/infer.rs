@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use clap::Args;
 
+use super::door::Door;
 use super::output::write_file;
 use super::progress::Steps;
 use super::units::UnitsArgs;
@@ -38,6 +39,8 @@ pub struct InferArgs {
     #[command(flatten)]
     opening: Opening,
     #[command(flatten)]
+    door: Door,
+    #[command(flatten)]
     units: UnitsArgs,
     #[command(flatten)]
     config: ConfigFile,
@@ -67,13 +70,13 @@ pub fn run(args: &InferArgs) -> anyhow::Result<Answer> {
     if folders.is_empty() {
         bare_trajectories(&trajectories, args.units.length(), &config, args.out.as_deref())
     } else {
-        recordings(&folders, args.opening, &config, args.words.open()?.as_ref(), args.out.as_deref())
+        recordings(&folders, (args.opening, args.door), &config, args.words.open()?.as_ref(), args.out.as_deref())
     }
 }
 
 fn recordings(
     folders: &[&PathBuf],
-    opening: Opening,
+    (opening, door): (Opening, Door),
     config: &Config,
     asked: Option<&Asked>,
     out: Option<&Path>,
@@ -82,7 +85,7 @@ fn recordings(
     let header = ["recording", "clip", "narration", "joint", "outcome"];
     let mut rows = vec![header.map(str::to_owned).to_vec()];
     // All are opened before the first is worked on: one that cannot be read is told at once.
-    let opened: Vec<Recording> = folders.iter().map(|f| opening.open(f)).collect::<Result<_, _>>()?;
+    let opened: Vec<Recording> = folders.iter().map(|f| door.open(opening, f)).collect::<Result<_, _>>()?;
     if let Some(asked) = asked.filter(|a| a.is_dry()) {
         return asked.count(&opened, config);
     }

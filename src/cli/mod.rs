@@ -6,6 +6,7 @@ mod ablate;
 mod check;
 mod config;
 mod demo;
+mod door;
 mod evaluate;
 mod evaluate_joints;
 mod export;

@@ -143,7 +143,7 @@ pub fn check_place(file: &Path, model: Option<&Model>, part: &Part, points: &[Po
     // Half a turn in radians, taken for degrees; and a motion that is none of so few of them.
     let few = std::f64::consts::PI.to_radians();
     if phi.kind == JointKind::Revolute && part.joint.upper < few && range > 10.0 * part.joint.upper {
-        let why = match model.map(|m| m.format) {
+        let why = match model.map(|m| m.format.clone()) {
             Some(Format::Mjcf { radian: false }) => "the file's angles are degrees; write <compiler angle=\"radian\"/>",
             _ => "are its limits degrees that were converted twice? they must be radians here",
         };

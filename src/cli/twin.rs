@@ -6,6 +6,7 @@ use std::time::Instant;
 use anyhow::bail;
 use clap::Args;
 
+use super::door::Door;
 use super::output::{Kind, Output};
 use super::progress::Steps;
 use super::words::{self as model, Asked, WordsArgs};
@@ -31,6 +32,8 @@ pub struct TwinArgs {
     out: PathBuf,
     #[command(flatten)]
     opening: Opening,
+    #[command(flatten)]
+    door: Door,
     #[command(flatten)]
     config: ConfigFile,
     /// Keep every intermediate result (trajectories, voxels, lines, candidates, marked images, questions to a language
@@ -67,7 +70,7 @@ pub fn run(args: &TwinArgs) -> anyhow::Result<Answer> {
     if let Some(asked) = asked.as_ref().filter(|a| a.is_dry()) {
         return asked.count(&[args.opening.open(&args.recording)?], &config);
     }
-    let given = Given { recording: &args.recording, opening: args.opening };
+    let given = Given { recording: &args.recording, opening: args.opening, door: args.door };
     make(given, &args.out, &config, args.keep, asked.as_ref())
 }
 
@@ -110,6 +113,8 @@ pub struct Given<'a> {
     pub recording: &'a Path,
     /// What may be read of it.
     pub opening: Opening,
+    /// What is done where it contradicts itself.
+    pub door: Door,
 }
 
 pub fn make(
@@ -130,7 +135,7 @@ pub fn make(
         );
     }
     let output = Output::new(out, Kind::Twin, &[given.recording])?;
-    let recording = given.opening.open(given.recording)?;
+    let recording = given.door.open(given.opening, given.recording)?;
     let steps = Steps::new();
     let model::Inferred { mut scene, reasoner, usage, exchanges, lost: unread } =
         model::infer(&recording, config, asked, &steps, keep_steps)?;

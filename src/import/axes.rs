@@ -125,6 +125,22 @@ impl Convention {
         Some(self.body_from_camera.map_or(body, |camera| body * camera))
     }
 
+    /// The pose as its numbers stood in the file, of a `world_from_camera` of this convention: metres and the file's axes.
+    #[must_use]
+    pub fn raw(&self, world_from_camera: &Pose) -> Pose {
+        let body = self.body_from_camera.map_or(*world_from_camera, |camera| world_from_camera * camera.inverse());
+        let world = world_matrix(self.left_handed);
+        let turn = world * body.rotation.to_rotation_matrix().into_inner() * camera_matrix(self.axes);
+        let raw = Pose::from_parts((world * body.translation.vector).into(), rotation(turn));
+        if self.direction == Direction::CameraFromWorld { raw.inverse() } else { raw }
+    }
+
+    /// A direction of the right-handed world in the source's own axes.
+    #[must_use]
+    pub fn source_vector(&self, v: &Vector) -> Vector {
+        world_matrix(self.left_handed) * v
+    }
+
     /// A point of the source's world, right-handed, metres.
     #[must_use]
     pub fn point(&self, p: &Point) -> Point {
@@ -206,6 +222,21 @@ mod tests {
         let rows: Vec<f64> = gl.transpose().iter().copied().collect();
         let c = Convention { axes: CameraAxes::Opengl, ..convention() };
         assert!(near(&c.world_from_camera(&RawPose::from_rows(&rows).unwrap()).unwrap(), &pose));
+    }
+
+    #[test]
+    fn the_numbers_of_a_file_are_found_again() {
+        let pose = some_pose();
+        for direction in [Direction::WorldFromCamera, Direction::CameraFromWorld] {
+            for (axes, left_handed) in
+                [(CameraAxes::Opencv, false), (CameraAxes::Opengl, false), (CameraAxes::Unity, true)]
+            {
+                let camera = Pose::translation(0.1, 0.0, -0.2);
+                let c = Convention { direction, axes, left_handed, body_from_camera: Some(camera), ..convention() };
+                let raw = RawPose::from_pose(&c.raw(&pose));
+                assert!(near(&c.world_from_camera(&raw).unwrap(), &pose), "{direction:?} {axes:?}");
+            }
+        }
     }
 
     /// A left-handed world with a left-handed camera shows the same points at the same pixels.

@@ -319,7 +319,8 @@ impl Imported {
         Ok(Some((name, bytes)))
     }
 
-    fn depth(&self, frame: usize, f: &Frame) -> Result<Option<(String, Vec<u8>)>> {
+    /// Depth of a frame as the output's camera sees it, metres.
+    pub(super) fn depth_grid(&self, f: &Frame) -> Result<Option<Grid<f32>>> {
         let Some((capture, depth)) =
             f.depth.and_then(|x| self.captures.get(x.capture)).and_then(|c| Some((c, c.depth.as_ref()?)))
         else {
@@ -329,11 +330,21 @@ impl Imported {
         let grid = decode::depth(&at.blob, at.confidence.as_ref(), depth)?;
         let camera = depth_camera(depth, at, &f.optics, &grid);
         let pose = self.color_from_depth(capture, depth, at, f);
-        let out = warp::depth(&grid, depth.along == Along::Ray, camera, pose.as_ref(), &self.view);
-        let to_mm = 1000.0 * self.depth_factor;
+        let mut out = warp::depth(&grid, depth.along == Along::Ray, camera, pose.as_ref(), &self.view);
+        if self.depth_factor != 1.0 {
+            out.data.iter_mut().for_each(|z| *z = (f64::from(*z) * self.depth_factor) as f32);
+        }
+        Ok(Some(out))
+    }
+
+    fn depth(&self, frame: usize, f: &Frame) -> Result<Option<(String, Vec<u8>)>> {
+        let Some(grid) = self.depth_grid(f)? else { return Ok(None) };
         // What 16 bits of millimetres cannot hold is no value.
-        let counts =
-            out.data.iter().map(|z| f64::from(*z) * to_mm).map(|mm| if mm < 65_535.5 { mm.round() as u16 } else { 0 });
+        let counts = grid
+            .data
+            .iter()
+            .map(|z| 1000.0 * f64::from(*z))
+            .map(|mm| if mm < 65_535.5 { mm.round() as u16 } else { 0 });
         let bytes: Vec<u8> = counts.flat_map(u16::to_ne_bytes).collect();
         Ok(Some((format!("depth/{frame:06}.png"), self.png(&bytes, ExtendedColorType::L16)?)))
     }
@@ -350,11 +361,16 @@ impl Imported {
         }
     }
 
-    fn mask(&self, frame: usize, f: &Frame) -> Result<Option<(String, Vec<u8>)>> {
+    /// Mask of a frame as the output's camera sees it.
+    pub(super) fn mask_grid(&self, f: &Frame) -> Result<Option<Grid<u8>>> {
         let Some(masks) = f.mask.and_then(|x| self.captures.get(x.capture)?.masks.as_ref()?.items.get(x.item)) else {
             return Ok(None);
         };
-        let grid = warp::mask(&masks.layers, &self.view, &f.optics)?;
+        warp::mask(&masks.layers, &self.view, &f.optics).map(Some)
+    }
+
+    fn mask(&self, frame: usize, f: &Frame) -> Result<Option<(String, Vec<u8>)>> {
+        let Some(grid) = self.mask_grid(f)? else { return Ok(None) };
         Ok(Some((format!("masks/{frame:06}.png"), self.png(&grid.data, ExtendedColorType::L8)?)))
     }
 

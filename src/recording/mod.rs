@@ -4,6 +4,7 @@
 
 pub mod at_work;
 mod columns;
+pub mod conventions;
 mod folder;
 pub mod grid;
 pub mod images;
@@ -206,7 +207,16 @@ impl Recording {
     /// # Errors
     /// Where the folder is no recording that can be used.
     pub fn open(dir: &std::path::Path) -> Result<Self> {
-        read::open(dir, false)
+        read::open(dir, false, true)
+    }
+
+    /// The same without the judgement whether hands are within reach of the head, which says that poses or hands mean something
+    /// else: for [`conventions::findings`], which says what.
+    ///
+    /// # Errors
+    /// As [`Self::open`], but for hands out of reach.
+    pub fn open_unjudged(dir: &std::path::Path, follow_links: bool) -> Result<Self> {
+        read::open(dir, follow_links, false)
     }
 
     /// The same, but links and paths may lead out of the folder.
@@ -214,7 +224,7 @@ impl Recording {
     /// # Errors
     /// As [`Self::open`].
     pub fn open_following_links(dir: &std::path::Path) -> Result<Self> {
-        read::open(dir, true)
+        read::open(dir, true, true)
     }
 
     /// The world's up direction (+Z by convention; good to about a degree).

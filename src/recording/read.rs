@@ -108,7 +108,8 @@ const TABLES: [&str; 7] = [
     "reconstruction.obj",
 ];
 
-pub(super) fn open(dir: &Path, follow_links: bool) -> Result<Recording> {
+/// `judge`: hands out of the head's reach are a fault.
+pub(super) fn open(dir: &Path, follow_links: bool, judge: bool) -> Result<Recording> {
     if !dir.is_dir() {
         let message = if dir.exists() {
             "is a file; a recording is a folder with cameras.json, clips.json and hands.json"
@@ -129,7 +130,7 @@ pub(super) fn open(dir: &Path, follow_links: bool) -> Result<Recording> {
     let frames = frames(&folder, &cameras, &mut faults);
     check_clips(&clips.clips, frames.len(), &mut faults);
     let Hands { samples: hands, contact_known } = hands(dir, frames.len(), &mut faults)?;
-    check_hands(&hands, contact_known, &frames, &mut faults);
+    check_hands(&hands, contact_known, &frames, judge, &mut faults);
     let labels = labels(dir)?;
     let reconstruction = reconstruction::read(dir)?;
     faults.finish(dir)?;
@@ -463,7 +464,7 @@ fn fingertips_csv(path: &Path) -> Result<Hands> {
 }
 
 /// A hand's own size tells the unit of the file, whatever the scene is like.
-fn check_hands(hands: &[HandSample], contact_known: bool, frames: &[Frame], faults: &mut Faults) {
+fn check_hands(hands: &[HandSample], contact_known: bool, frames: &[Frame], judge: bool, faults: &mut Faults) {
     if hands.is_empty() {
         faults.add("hands", "hands.json / fingertips.csv: no hand in any frame".to_owned());
         return;
@@ -482,13 +483,14 @@ fn check_hands(hands: &[HandSample], contact_known: bool, frames: &[Frame], faul
             ),
         );
     } else if let Some(distance) = stats::median(&distances)
+        && judge
         && !(0.05..3.0).contains(&distance)
     {
         faults.add(
             "units",
             format!(
                 "hands are {distance:.2} from the camera (median), an arm reaches 0.2 to 1.2 m; hands and camera poses \
-                 must share one world frame and one unit (metres)"
+                 must share one world frame and one unit (metres); paws import --check looks for the cause"
             ),
         );
     }

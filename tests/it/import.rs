@@ -339,7 +339,8 @@ fn a_scale_that_nothing_tells_is_asked_for() {
     assert_eq!(out.status.code(), Some(2));
     assert!(stderr(&out).contains("--scale"), "{}", stderr(&out));
     assert!(!dir.path().join("out").exists());
-    import(&["work", "--scale", "2.5", "--up", "z"], dir.path());
+    // Up is not z of that world, which would be told.
+    import(&["work", "--scale", "2.5"], dir.path());
 }
 
 /// Time of a frame of the capture below, seconds: the recording's own repeat where a person waits.
@@ -573,4 +574,49 @@ fn the_formats_are_listed() {
         assert!(text.contains(name), "{text}");
     }
     assert_eq!(out.status.code(), Some(0));
+}
+
+/// A right source under a wrong option: the options that undo it are named, and `--fix` sets them.
+#[test]
+fn wrong_conventions_of_three_formats_are_named_and_corrected() {
+    let dir = tempfile::tempdir().unwrap();
+    let stray = write_stray(&dir.path().join("stray"));
+    let tum = write_tum(&dir.path().join("tum"), true);
+    write_colmap(&dir.path().join("colmap"), true, 2.5);
+    write_tum(&dir.path().join("depth"), false);
+    // Sources, whether what `--fix` makes of them is held against the truth, the wrong options, the option that is named.
+    type Case = (&'static [&'static str], bool, &'static [&'static str], &'static str);
+    let cases: [Case; 11] = [
+        (&["stray"], true, &["--poses", "camera-from-world"], "--poses world-from-camera"),
+        (&["stray"], true, &["--camera-axes", "opengl"], "--camera-axes opencv"),
+        (&["stray"], true, &["--quaternion", "wxyz"], "--quaternion xyzw"),
+        (&["stray"], false, &["--unit", "0.001"], "--unit "),
+        (&["stray"], true, &["--up", "z"], "--up y"),
+        (&["tum"], true, &["--poses", "camera-from-world", "--up", "z"], "--poses world-from-camera"),
+        (&["tum"], true, &["--camera-axes", "opengl", "--up", "z"], "--camera-axes opencv"),
+        (&["tum"], false, &["--up", "y"], "--up z"),
+        (&["tum"], false, &["--unit", "0.4", "--up", "z"], "--unit "),
+        (&["colmap", "depth"], false, &["--poses", "world-from-camera", "--scale", "2.5"], "--poses camera-from-world"),
+        (&["colmap", "depth"], false, &["--scale", "1"], "--scale "),
+    ];
+    assert!(apart(&stray, &tum).0 < 1e-9);
+    for (sources, is_held, wrong, option) in cases {
+        let mut args = vec!["import"];
+        args.extend(sources);
+        args.extend(wrong);
+        args.extend(["--fps", "0", "--out", "out"]);
+        let out = paws(&args, dir.path());
+        let text = String::from_utf8_lossy(&out.stdout).into_owned();
+        assert_eq!(out.status.code(), Some(1), "{args:?}: {text}{}", stderr(&out));
+        assert!(text.contains("doubtful") && text.contains(option), "{args:?}: {text}");
+        if !is_held {
+            continue;
+        }
+        args.push("--fix");
+        let out = paws(&args, dir.path());
+        let text = String::from_utf8_lossy(&out.stdout).into_owned();
+        assert!(text.contains("corrected by") && out.status.code() == Some(0), "{args:?}: {text}{}", stderr(&out));
+        let (m, deg) = apart(&stray, &poses(&dir.path().join("out")));
+        assert!(m < 1e-6 && deg < 1e-4, "{args:?}: {m} m, {deg} degrees");
+    }
 }

@@ -7,6 +7,7 @@ mod articulations;
 mod bad_input;
 mod bare_trajectories;
 mod common;
+mod conventions;
 mod floors;
 mod foreign;
 mod formats;
