@@ -276,17 +276,17 @@ impl Scan<'_> {
         }
         let outer = home.piece(start, packed);
         let whole = Blob::Packed { outer: Box::new(outer.clone()), packing, start: 0, length: Some(size) };
-        match whole.read() {
-            Ok(bytes) => {
-                let mut inner = Stream { reader: Cursor::new(bytes), at: 0 };
-                self.walk(&mut inner, size, &Home::Packed(outer, packing)).map(|_| ())
-            }
-            // One bad chunk costs only itself.
-            Err(error) => {
-                self.faults.push(error.to_string());
-                Ok(())
-            }
+        // One bad chunk costs only itself.
+        let walked = whole.read().and_then(|bytes| {
+            let mut inner = Stream { reader: Cursor::new(bytes), at: 0 };
+            self.walk(&mut inner, size, &Home::Packed(outer, packing))
+        });
+        match walked {
+            Ok(true) => {}
+            Ok(false) => self.faults.push(format!("the chunk at byte {body} ends in the middle of a record")),
+            Err(error) => self.faults.push(error.to_string()),
         }
+        Ok(())
     }
 }
 

@@ -11,6 +11,8 @@ mod foreign;
 mod formats;
 mod honesty;
 mod import;
+mod import_devices;
+mod import_ros;
 mod known_truth;
 mod mjcf;
 mod models;
