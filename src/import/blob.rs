@@ -177,6 +177,16 @@ pub fn inside(root: &Path, name: &str) -> Result<Option<PathBuf>> {
     if real.starts_with(&real_root) { Ok(Some(path)) } else { Err(outside()) }
 }
 
+/// The path of a file that lies in the folder of another one. `Ok(None)` where there is no such file.
+///
+/// # Errors
+/// As [`inside`].
+pub fn beside(file: &Path, name: &str) -> Result<Option<PathBuf>> {
+    // A bare name has an empty folder, which is no path.
+    let folder = file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    inside(folder, name)
+}
+
 /// Files of a folder (not of its subfolders) with one of the endings, in the order of their names, numbers by value. Empty
 /// where the folder is not there. Hidden files and links that lead out of the folder are left out.
 #[must_use]

@@ -2,6 +2,7 @@
 //! stay where they are.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
@@ -206,10 +207,10 @@ impl Scan<'_> {
         let mut fields = Fields(bytes);
         let (id, schema, topic, encoding) = (fields.u16()?, fields.u16()?, fields.text()?, fields.text()?);
         // Chunks repeat the channels that they use.
-        if !self.channels.contains_key(&id) {
+        if let Entry::Vacant(place) = self.channels.entry(id) {
             let channel = Channel { topic, schema: self.schemas.get(&schema).cloned().unwrap_or_default(), encoding };
             let want = self.visitor.want(&channel);
-            self.channels.insert(id, (channel, want));
+            place.insert((channel, want));
         }
         Some(())
     }

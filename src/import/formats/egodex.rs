@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::error::Result;
 use crate::import::Options;
-use crate::import::blob::inside;
+use crate::import::blob::beside;
 use crate::import::capture::{
     At, Capture, ClipAt, HandAt, Hands, ImageAt, JointFrame, Missing, Picture, PoseAt, Poses, RawPose, World,
 };
@@ -36,7 +36,7 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         .enumerate()
         .filter_map(|(i, rows)| Some(PoseAt { at: at(i), pose: RawPose::from_rows(rows)?, optics: None }));
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let video = inside(path.parent().unwrap_or(Path::new(".")), &format!("{stem}.mp4"))?;
+    let video = beside(path, &format!("{stem}.mp4"))?;
     let images = video.iter().flat_map(|file| {
         (0..count).map(move |index| {
             let picture = Picture::Video { file: file.clone(), index, upright: false };

@@ -10,7 +10,7 @@ use serde::Deserialize;
 
 use crate::error::{Error, Result};
 use crate::import::Options;
-use crate::import::blob::{Blob, inside};
+use crate::import::blob::{Blob, beside};
 use crate::import::capture::{
     Along, At, ByteOrder, CameraAxes, Capture, Depth, DepthAt, DepthCoding, HandAt, Hands, ImageAt, JointFrame,
     Picture, PoseAt, Poses, RawPose, Turn, World,
@@ -40,12 +40,11 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
         return super::mcap::read(path, options);
     }
     let file = annotation(path);
-    let root = file.parent().unwrap_or(Path::new("."));
     let h5 = Hdf5::open(&file)?;
     let mut notes = Vec::new();
-    let calibration = Calibration::of(root)?;
+    let calibration = Calibration::of(&file)?;
     let times = times(&h5)?;
-    let images = match inside(root, "rgb.mp4")? {
+    let images = match beside(&file, "rgb.mp4")? {
         Some(video) => pictures(&video, &times),
         None => Vec::new(),
     };
@@ -192,24 +191,24 @@ struct Size {
 }
 
 impl Calibration {
-    fn of(root: &Path) -> Result<Option<Self>> {
-        let Some(meta) = inside(root, "calibrations/meta.json")? else { return Ok(None) };
+    fn of(file: &Path) -> Result<Option<Self>> {
+        let Some(meta) = beside(file, "calibrations/meta.json")? else { return Ok(None) };
         let meta: Meta = crate::json::read(&meta)?;
         let camera = |size: Option<Size>, name: &str| -> Result<Option<Optics>> {
-            let (Some(size), Some(k)) = (size, matrix(root, name)?) else { return Ok(None) };
+            let (Some(size), Some(k)) = (size, matrix(file, name)?) else { return Ok(None) };
             Ok(Some(Optics::pinhole(size.width, size.height, [k[0], k[4], k[2], k[5]])))
         };
         Ok(Some(Self {
             color: camera(meta.rgb, "calibrations/rgb_K.npy")?,
             depth: camera(meta.depth, "calibrations/depth_K.npy")?,
-            body_from_camera: matrix(root, "calibrations/R_optical_to_link.npy")?.map(|rows| turned(&rows)),
+            body_from_camera: matrix(file, "calibrations/R_optical_to_link.npy")?.map(|rows| turned(&rows)),
         }))
     }
 }
 
-/// Nine numbers of a numpy file; `None` where it is not there.
-fn matrix(root: &Path, name: &str) -> Result<Option<[f64; 9]>> {
-    let Some(path) = inside(root, name)? else { return Ok(None) };
+/// Nine numbers of a numpy file beside another file; `None` where it is not there.
+fn matrix(file: &Path, name: &str) -> Result<Option<[f64; 9]>> {
+    let Some(path) = beside(file, name)? else { return Ok(None) };
     let bytes = Blob::File(path.clone()).read()?;
     let wrong =
         |what: String| Error::format(&path, "matrix", format!("{what}; expected 3 x 3 numbers of type float64"));
