@@ -18,7 +18,7 @@ use crate::recording::Side;
 /// Frames a second where the file does not say.
 const USUAL_FPS: f64 = 30.0;
 /// The keys that tell the format stand within the first bytes.
-const LOOKED_AT_BYTES: u64 = 4096;
+const LOOKED_AT_BYTES: u64 = 64 << 10;
 
 pub(super) fn detect(path: &Path) -> bool {
     let is_json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
