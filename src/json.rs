@@ -16,7 +16,11 @@ use crate::error::{Error, Result};
 /// Text files above this are refused: hours of hands fit in it, and a broken export must not fill the memory.
 const MAX_TEXT_BYTES: u64 = 1 << 30;
 
-fn read_text(path: &Path) -> Result<String> {
+/// The text of a file, for readers that mend it before they parse it.
+///
+/// # Errors
+/// Where it cannot be read or is no text.
+pub(crate) fn read_text(path: &Path) -> Result<String> {
     let file = File::open(path).map_err(|e| {
         let mut error = Error::io(path, &e);
         if let (Error::Io { message, .. }, Some(name)) = (&mut error, path.file_name()) {
@@ -82,7 +86,11 @@ pub fn of_value<T: DeserializeOwned>(value: &serde_json::Value) -> std::result::
     }
 }
 
-fn parse<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T> {
+/// Parses a text that stands in a file, as [`read`] does.
+///
+/// # Errors
+/// As [`read`].
+pub(crate) fn parse<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T> {
     let error = match serde_json::from_str(text) {
         Ok(value) => return Ok(value),
         Err(error) => error,

@@ -73,6 +73,10 @@ struct FrameArgs {
     /// Intrinsics of the images, where no source has them: WIDTH,HEIGHT,FX,FY,CX,CY in pixels
     #[arg(long, value_name = "W,H,FX,FY,CX,CY", value_parser = camera)]
     camera: Option<Optics>,
+    /// A topic of a ROS recording: color=/TOPIC, depth=/TOPIC or poses=/TOPIC (or poses=tf); may be given several times
+    /// [default: guessed from types, names and frames]
+    #[arg(long, value_name = "WHAT=TOPIC", value_parser = topic)]
+    topic: Vec<(String, String)>,
     /// The ffmpeg program, ffprobe beside it [default: the installed one]
     #[arg(long, value_name = "PATH")]
     ffmpeg: Option<PathBuf>,
@@ -123,6 +127,15 @@ fn camera(text: &str) -> Result<Optics, String> {
     optics.fault().map_or(Ok(optics), Err)
 }
 
+fn topic(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((what @ ("color" | "depth" | "poses"), topic)) if !topic.is_empty() => {
+            Ok((what.to_owned(), topic.to_owned()))
+        }
+        _ => Err("write color=/TOPIC, depth=/TOPIC or poses=/TOPIC".to_owned()),
+    }
+}
+
 impl ImportArgs {
     fn options(&self) -> anyhow::Result<Options> {
         let (f, c) = (&self.frames, &self.convention);
@@ -157,6 +170,7 @@ impl ImportArgs {
             quaternion: c.quaternion,
             scale: c.scale,
             hand_lag_secs: c.hand_lag,
+            topics: f.topic.iter().cloned().collect(),
             ffmpeg: f.ffmpeg.clone(),
         })
     }
@@ -351,6 +365,8 @@ mod tests {
         assert_eq!(quarters("90"), Ok(1));
         assert!(quarters("45").is_err());
         assert_eq!(camera("640,480,400,400,319.5,239.5").unwrap().width, 640);
+        assert_eq!(topic("color=/a/b").unwrap(), ("color".to_owned(), "/a/b".to_owned()));
+        assert!(topic("colour=/a").is_err() && topic("color").is_err() && topic("depth=").is_err());
         assert!(camera("640,480,400").is_err() && camera("0,0,1,1,1,1").is_err());
     }
 }

@@ -5,6 +5,8 @@ use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
+use super::h5::Hdf5;
+pub use super::pack::Packing;
 use crate::error::{Error, Result};
 
 /// Above this no single image or array of a recording is believed: a 4K float depth image has 33 MB.
@@ -33,6 +35,26 @@ pub enum Blob {
     },
     /// Bytes in memory.
     Inline(Arc<[u8]>),
+    /// A piece of what other bytes are when they are unpacked.
+    Packed {
+        /// The packed bytes.
+        outer: Box<Blob>,
+        /// How they are packed.
+        packing: Packing,
+        /// The piece's first byte in what is packed.
+        start: u64,
+        /// How many bytes; `None`: all that follow.
+        length: Option<u64>,
+    },
+    /// Unsigned 16-bit numbers of a row of an HDF5 dataset, least significant byte first.
+    Counts {
+        /// The file.
+        file: PathBuf,
+        /// The dataset's path in it.
+        dataset: String,
+        /// The row, along the first dimension.
+        row: u64,
+    },
 }
 
 impl Blob {
@@ -40,7 +62,11 @@ impl Blob {
     #[must_use]
     pub fn file(&self) -> &Path {
         match self {
-            Self::File(path) | Self::Entry { archive: path, .. } | Self::Range { file: path, .. } => path,
+            Self::File(path)
+            | Self::Entry { archive: path, .. }
+            | Self::Range { file: path, .. }
+            | Self::Counts { file: path, .. } => path,
+            Self::Packed { outer, .. } => outer.file(),
             Self::Inline(_) => Path::new("memory"),
         }
     }
@@ -53,6 +79,9 @@ impl Blob {
             Self::Entry { name, .. } => format!("entry {name}"),
             Self::Range { offset, length, .. } => format!("bytes {offset} to {}", offset.saturating_add(*length)),
             Self::Inline(bytes) => format!("{} bytes", bytes.len()),
+            Self::Packed { outer, start, .. } if *start > 0 => format!("{}, unpacked from byte {start}", outer.place()),
+            Self::Packed { outer, .. } => outer.place(),
+            Self::Counts { dataset, row, .. } => format!("{dataset}, row {row}"),
         }
     }
 
@@ -86,7 +115,29 @@ impl Blob {
                 let entry = zip.by_name(name).map_err(|e| self.fault(format!("cannot be read ({e})")))?;
                 self.bounded(entry)
             }
+            Self::Packed { outer, packing, start, length } => self.unpacked(&outer.read()?, *packing, *start, *length),
+            Self::Counts { file, dataset, row } => Hdf5::open(file)?.counts(dataset, *row),
         }
+    }
+
+    fn unpacked(&self, packed: &[u8], packing: Packing, start: u64, length: Option<u64>) -> Result<Vec<u8>> {
+        let most = MAX_BLOB_BYTES + 1;
+        let bytes = packing
+            .unpack(packed, |reader| {
+                std::io::copy(&mut Read::take(&mut *reader, start), &mut std::io::sink())?;
+                let mut bytes = Vec::new();
+                Read::take(reader, length.unwrap_or(most).min(most)).read_to_end(&mut bytes)?;
+                Ok(bytes)
+            })
+            .map_err(|e| self.fault(format!("cannot be unpacked ({e}); was the file copied as a whole?")))?;
+        let found = bytes.len() as u64;
+        if found > MAX_BLOB_BYTES {
+            return Err(self.fault(format!("is above {} MiB", MAX_BLOB_BYTES >> 20)));
+        }
+        if let Some(wanted) = length.filter(|n| found < *n) {
+            return Err(self.fault(format!("unpacks to {found} bytes, {wanted} were expected")));
+        }
+        Ok(bytes)
     }
 
     fn bounded(&self, reader: impl Read) -> Result<Vec<u8>> {
@@ -124,6 +175,16 @@ pub fn inside(root: &Path, name: &str) -> Result<Option<PathBuf>> {
     }
     let (Ok(real), Ok(real_root)) = (path.canonicalize(), root.canonicalize()) else { return Ok(None) };
     if real.starts_with(&real_root) { Ok(Some(path)) } else { Err(outside()) }
+}
+
+/// The path of a file that lies in the folder of another one. `Ok(None)` where there is no such file.
+///
+/// # Errors
+/// As [`inside`].
+pub fn beside(file: &Path, name: &str) -> Result<Option<PathBuf>> {
+    // A bare name has an empty folder, which is no path.
+    let folder = file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    inside(folder, name)
 }
 
 /// Files of a folder (not of its subfolders) with one of the endings, in the order of their names, numbers by value. Empty

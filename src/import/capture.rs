@@ -78,6 +78,44 @@ pub enum Picture {
         /// Whether the rotation in the file's metadata is applied. No where intrinsics and poses are the sensor's.
         upright: bool,
     },
+    /// Rows of pixels as they are.
+    Raw {
+        /// The bytes.
+        blob: Blob,
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+        /// What a pixel's bytes are.
+        pixels: Pixels,
+    },
+}
+
+/// Order of a raw pixel's bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pixels {
+    /// Grey.
+    Grey,
+    /// Red, green, blue.
+    Rgb,
+    /// Blue, green, red.
+    Bgr,
+    /// Red, green, blue and a byte that counts for nothing.
+    Rgba,
+    /// Blue, green, red and a byte that counts for nothing.
+    Bgra,
+}
+
+impl Pixels {
+    /// Bytes of a pixel.
+    #[must_use]
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::Grey => 1,
+            Self::Rgb | Self::Bgr => 3,
+            Self::Rgba | Self::Bgra => 4,
+        }
+    }
 }
 
 /// A colour image at a time.

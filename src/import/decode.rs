@@ -5,7 +5,7 @@ use std::io::Cursor;
 use image::{DynamicImage, ImageReader};
 
 use super::blob::Blob;
-use super::capture::{ByteOrder, Depth, DepthCoding};
+use super::capture::{ByteOrder, Depth, DepthCoding, Pixels};
 use crate::error::{Error, Result};
 use crate::recording::{Grid, images};
 
@@ -33,6 +33,32 @@ pub fn picture(blob: &Blob) -> Result<DynamicImage> {
     let decoder = reader.into_decoder().map_err(wrong)?;
     images::believable(&decoder, file_bytes).map_err(|e| blob.fault(e))?;
     DynamicImage::from_decoder(decoder).map_err(wrong)
+}
+
+/// An image of raw pixels.
+///
+/// # Errors
+/// Where there are more or fewer bytes than pixels.
+pub fn raw_picture(blob: &Blob, width: usize, height: usize, pixels: Pixels) -> Result<DynamicImage> {
+    let bytes = blob.read()?;
+    let expected = width.checked_mul(height).filter(|n| *n <= MAX_PIXELS).map(|n| n * pixels.bytes());
+    let wrong = || {
+        let of = pixels.bytes();
+        blob.fault(format!("has {} bytes; {width} x {height} pixels of {of} bytes were expected", bytes.len()))
+    };
+    if expected != Some(bytes.len()) {
+        return Err(wrong());
+    }
+    let rgb: Vec<u8> = match pixels {
+        Pixels::Grey => bytes.iter().flat_map(|v| [*v; 3]).collect(),
+        Pixels::Rgb | Pixels::Rgba => {
+            bytes.chunks_exact(pixels.bytes()).flat_map(|c| c.iter().take(3).copied()).collect()
+        }
+        Pixels::Bgr | Pixels::Bgra => {
+            bytes.chunks_exact(pixels.bytes()).flat_map(|c| c.iter().take(3).rev().copied()).collect()
+        }
+    };
+    image::RgbImage::from_raw(width as u32, height as u32, rgb).map(DynamicImage::ImageRgb8).ok_or_else(wrong)
 }
 
 /// Values of 8 bits of a grey image, or one byte a pixel of a raw array of a known size.
@@ -323,6 +349,22 @@ mod tests {
             let error = depth(&inline(&bytes), None, &how(DepthCoding::Npy { unit_m: 1.0 })).unwrap_err().to_string();
             assert!(error.contains(word), "{error}");
         }
+    }
+
+    #[test]
+    fn raw_pixels_become_red_green_blue() {
+        let cases: [(Pixels, &[u8]); 4] = [
+            (Pixels::Rgb, &[1, 2, 3, 4, 5, 6]),
+            (Pixels::Bgr, &[3, 2, 1, 6, 5, 4]),
+            (Pixels::Rgba, &[1, 2, 3, 0, 4, 5, 6, 0]),
+            (Pixels::Bgra, &[3, 2, 1, 0, 6, 5, 4, 0]),
+        ];
+        for (pixels, bytes) in cases {
+            let image = raw_picture(&inline(bytes), 2, 1, pixels).unwrap().into_rgb8();
+            assert_eq!(image.into_raw(), [1, 2, 3, 4, 5, 6], "{pixels:?}");
+            assert!(raw_picture(&inline(bytes), 3, 1, pixels).is_err());
+        }
+        assert_eq!(raw_picture(&inline(&[7]), 1, 1, Pixels::Grey).unwrap().into_rgb8().into_raw(), [7, 7, 7]);
     }
 
     #[test]

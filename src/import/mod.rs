@@ -19,14 +19,19 @@ pub mod capture;
 pub mod checks;
 pub mod decode;
 pub mod formats;
+pub mod h5;
 pub mod join;
 pub mod joints;
+pub mod mcap;
 pub mod names;
 pub mod optics;
+pub mod pack;
 pub mod ply;
 pub mod poses;
 pub mod report;
+pub mod ros;
 pub mod text;
+pub mod tf;
 pub mod video;
 pub mod view;
 pub mod warp;
@@ -37,6 +42,7 @@ mod people;
 mod timeline;
 mod world;
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 pub use assembly::assemble;
@@ -80,6 +86,8 @@ pub struct Options {
     pub scale: Option<f64>,
     /// What is added to the hands' times, seconds.
     pub hand_lag_secs: f64,
+    /// Topics of a robot's recording by what they hold: `color`, `depth`, `poses`. Those that are not told are guessed.
+    pub topics: BTreeMap<String, String>,
     /// The ffmpeg program, ffprobe beside it; `None`: those that are installed.
     pub ffmpeg: Option<PathBuf>,
 }
@@ -104,6 +112,7 @@ impl Default for Options {
             quaternion: None,
             scale: None,
             hand_lag_secs: 0.0,
+            topics: BTreeMap::new(),
             ffmpeg: None,
         }
     }

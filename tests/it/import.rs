@@ -570,7 +570,7 @@ fn the_formats_are_listed() {
     let dir = tempfile::tempdir().unwrap();
     let out = paws(&["import", "--list"], dir.path());
     let text = String::from_utf8(out.stdout).unwrap();
-    for name in ["stray", "colmap", "tum", "frames"] {
+    for name in ["stray", "stera", "mcap", "record3d", "polycam", "egodex", "ego-vision", "colmap", "tum", "frames"] {
         assert!(text.contains(name), "{text}");
     }
     assert_eq!(out.status.code(), Some(0));

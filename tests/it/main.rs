@@ -15,6 +15,8 @@ mod honesty;
 mod hostile;
 mod import;
 mod import_tools;
+mod import_devices;
+mod import_ros;
 mod known_truth;
 mod mjcf;
 mod models;

@@ -8,6 +8,8 @@ mod arti4d;
 mod cloud;
 mod colmap;
 mod colmap_binary;
+mod ego_vision;
+mod egodex;
 mod epic_fields;
 mod frames;
 mod grounded_sam;
@@ -15,9 +17,13 @@ mod hands;
 mod hands23;
 mod lines2d;
 mod mapanything;
+mod mcap;
 mod moge;
 mod narrations;
 mod nerfstudio;
+mod polycam;
+mod record3d;
+mod stera;
 mod stray;
 mod subtitles;
 mod tum;
@@ -51,6 +57,48 @@ pub const ALL: &[Format] = &[
         holds: "poses, images, depth",
         detect: stray::detect,
         read: stray::read,
+    },
+    Format {
+        name: "stera",
+        title: "Stera SDK episode (iPhone Pro): annotation.hdf5, rgb.mp4, calibrations",
+        holds: "poses, images, depth, hands",
+        detect: stera::detect,
+        read: stera::read,
+    },
+    Format {
+        name: "mcap",
+        title: "ROS 2 recording in MCAP, file or rosbag2 folder (RGB-D robots, Stera app)",
+        holds: "poses, images, depth",
+        detect: mcap::detect,
+        read: mcap::read,
+    },
+    Format {
+        name: "record3d",
+        title: "Record3D .r3d archive, or its EXR + JPG folder (iPhone, iPad)",
+        holds: "poses, images, depth",
+        detect: record3d::detect,
+        read: record3d::read,
+    },
+    Format {
+        name: "polycam",
+        title: "Polycam raw data (iPhone, iPad with LiDAR)",
+        holds: "poses, images, depth",
+        detect: polycam::detect,
+        read: polycam::read,
+    },
+    Format {
+        name: "egodex",
+        title: "EgoDex recording (Vision Pro): N.hdf5 beside N.mp4",
+        holds: "poses, images, hands, clips",
+        detect: egodex::detect,
+        read: egodex::read,
+    },
+    Format {
+        name: "ego-vision",
+        title: "ego-vision result (JSON)",
+        holds: "poses, intrinsics, hands",
+        detect: ego_vision::detect,
+        read: ego_vision::read,
     },
     Format {
         name: "colmap",
