@@ -271,7 +271,7 @@ impl Imported {
             return Ok(None);
         };
         let blob = match &source.picture {
-            Picture::Still(blob) => blob.clone(),
+            Picture::Still(blob) | Picture::Raw { blob, .. } => blob.clone(),
             Picture::Video { file, index, .. } => match self.extracted.get(&(file.clone(), *index)) {
                 Some(path) => Blob::File(path.clone()),
                 None => return Ok(None),
@@ -279,13 +279,14 @@ impl Imported {
         };
         // A picture of a video lies in a folder of no name: the video is what a user knows.
         let named = |error: Error| match &source.picture {
-            Picture::Still(_) => error,
+            Picture::Still(_) | Picture::Raw { .. } => error,
             Picture::Video { file, index, .. } => {
                 Error::format(file, format!("picture {index}"), "what ffmpeg made of it cannot be read")
             }
         };
         let name = format!("frames/{frame:06}.jpg");
-        if self.view.is_same(&f.optics) {
+        let is_file = !matches!(source.picture, Picture::Raw { .. });
+        if is_file && self.view.is_same(&f.optics) {
             let bytes = blob.read().map_err(named)?;
             let is_jpeg = bytes.starts_with(&[0xFF, 0xD8, 0xFF]);
             let size = image::ImageReader::new(std::io::Cursor::new(&bytes))
@@ -296,11 +297,14 @@ impl Imported {
                 return Ok(Some((name, bytes)));
             }
         }
-        let image = decode::picture(&blob).map_err(named)?.into_rgb8();
+        let image = match &source.picture {
+            Picture::Raw { width, height, coding, .. } => decode::pixels(&blob, *width, *height, *coding)?,
+            _ => decode::picture(&blob).map_err(named)?.into_rgb8(),
+        };
         let (width, height) = (image.width() as usize, image.height() as usize);
         if !f.optics.has_shape(width, height) {
             let file = match &source.picture {
-                Picture::Still(blob) => blob.file(),
+                Picture::Still(blob) | Picture::Raw { blob, .. } => blob.file(),
                 Picture::Video { file, .. } => file.as_path(),
             };
             let message = format!(

@@ -358,7 +358,7 @@ pub(super) fn video_pictures(captures: &[Capture], frames: &[Draft]) -> Vec<(std
             let image = f.image?;
             match &captures.get(image.capture)?.images.get(image.item)?.picture {
                 Picture::Video { file, index, upright } => Some((file.clone(), *upright, *index)),
-                Picture::Still(_) => None,
+                Picture::Still(_) | Picture::Raw { .. } => None,
             }
         })
         .collect()
