@@ -136,6 +136,11 @@ pub(super) struct Thinned {
 }
 
 impl Thinned {
+    /// The points that were kept.
+    pub fn into_points(self) -> Vec<Point> {
+        self.kept
+    }
+
     /// One more point.
     pub fn push(&mut self, p: Point) {
         self.step = self.step.max(1);

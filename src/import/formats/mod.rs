@@ -3,9 +3,14 @@
 //! A reader fills a [`Capture`] with what the files hold and declares it; it converts nothing. It reads tables at once and
 //! leaves images as blobs. Its errors name file, place and way out. `detect` looks at names and first lines only.
 
+mod aria;
+mod aria_camera;
+mod aria_depth;
+mod aria_walk;
 mod colmap;
 mod colmap_binary;
 mod frames;
+mod hdepic;
 mod stray;
 mod tum;
 
@@ -37,6 +42,20 @@ pub const ALL: &[Format] = &[
         holds: "poses, images, depth",
         detect: stray::detect,
         read: stray::read,
+    },
+    Format {
+        name: "aria",
+        title: "Project Aria glasses with MPS results; Aria Gen 2 pilot recordings",
+        holds: "poses, hands, points, images or depth beside it",
+        detect: aria::detect,
+        read: aria::read,
+    },
+    Format {
+        name: "hdepic",
+        title: "HD-EPIC: a trajectory of its tools, or a storage folder with one video",
+        holds: "poses, images, points, narrations",
+        detect: hdepic::detect,
+        read: hdepic::read,
     },
     Format {
         name: "colmap",
