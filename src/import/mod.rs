@@ -23,6 +23,7 @@ pub mod joints;
 pub mod optics;
 pub mod poses;
 pub mod report;
+pub mod tar;
 pub mod text;
 pub mod video;
 pub mod view;

@@ -250,8 +250,8 @@ fn of_lines(file: &Path, video: &str) -> Result<Vec<Told>> {
 
 /// The first word of a list as Python writes it: `['open', 'pull']`.
 fn first_word(list: &str) -> String {
-    let first = list.trim_matches(|c| "[]() ".contains(c)).split(',').next().unwrap_or_default();
-    first.trim().trim_matches(|c| c == '\'' || c == '"').to_owned()
+    let first = list.trim_matches(['[', ']', '(', ')', ' ']).split(',').next().unwrap_or_default();
+    first.trim().trim_matches(['\'', '"']).to_owned()
 }
 
 /// The glasses' time of a time of the video: between two pictures, else that of the first or last one.

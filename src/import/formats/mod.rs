@@ -11,8 +11,12 @@ mod colmap;
 mod colmap_binary;
 mod frames;
 mod hdepic;
+mod hololens;
+mod quest;
+mod quest_hands;
 mod stray;
 mod tum;
+mod visionpro;
 
 use std::path::Path;
 
@@ -56,6 +60,34 @@ pub const ALL: &[Format] = &[
         holds: "poses, images, points, narrations",
         detect: hdepic::detect,
         read: hdepic::read,
+    },
+    Format {
+        name: "hololens",
+        title: "HoloLens 2 recording of StreamRecorder (HoloLens2ForCV)",
+        holds: "poses, images, depth, hands",
+        detect: hololens::detect,
+        read: hololens::read,
+    },
+    Format {
+        name: "quest",
+        title: "Quest 3 recording of QuestRealityCapture",
+        holds: "poses, images, depth",
+        detect: quest::detect,
+        read: quest::read,
+    },
+    Format {
+        name: "quest-hands",
+        title: "Hand Tracking Streamer (Quest), its lines in a text file",
+        holds: "hands, poses of the head",
+        detect: quest_hands::detect,
+        read: quest_hands::read,
+    },
+    Format {
+        name: "visionpro",
+        title: "Vision Pro recording of Tracking Streamer",
+        holds: "poses, hands, images",
+        detect: visionpro::detect,
+        read: visionpro::read,
     },
     Format {
         name: "colmap",
