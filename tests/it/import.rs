@@ -19,25 +19,25 @@ use crate::common::{SMALL, paws, stderr};
 /// Frames that a test writes: enough to join, few enough to be quick.
 const FRAMES: usize = 24;
 
-fn small() -> Recording {
+pub fn small() -> Recording {
     Recording::open(SMALL.path()).unwrap()
 }
 
-fn write(path: &Path, bytes: impl AsRef<[u8]>) {
+pub fn write(path: &Path, bytes: impl AsRef<[u8]>) {
     std::fs::create_dir_all(path.parent().unwrap()).unwrap();
     std::fs::write(path, bytes).unwrap();
 }
 
-fn still(name: &str, frame: usize) -> PathBuf {
+pub fn still(name: &str, frame: usize) -> PathBuf {
     SMALL.path().join(name).join(format!("{frame:06}.{}", if name == "frames" { "jpg" } else { "png" }))
 }
 
-fn copy(from: &Path, to: &Path) {
+pub fn copy(from: &Path, to: &Path) {
     write(to, std::fs::read(from).unwrap());
 }
 
 /// Runs `paws import` and expects it to do its work.
-fn import(args: &[&str], dir: &Path) -> String {
+pub fn import(args: &[&str], dir: &Path) -> String {
     let mut all = vec!["import"];
     all.extend(args);
     all.extend(["--out", "out"]);
@@ -46,12 +46,12 @@ fn import(args: &[&str], dir: &Path) -> String {
     String::from_utf8(out.stdout).unwrap()
 }
 
-fn json(path: &Path) -> Value {
+pub fn json(path: &Path) -> Value {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
 /// The poses of an imported recording.
-fn poses(out: &Path) -> Vec<Pose> {
+pub fn poses(out: &Path) -> Vec<Pose> {
     let cameras = json(&out.join("cameras.json"));
     let read = |v: &Value| -> Vec<f64> { serde_json::from_value(v.clone()).unwrap() };
     cameras["frames"]
@@ -66,11 +66,11 @@ fn poses(out: &Path) -> Vec<Pose> {
         .collect()
 }
 
-fn same_bytes(a: &Path, b: &Path) -> bool {
+pub fn same_bytes(a: &Path, b: &Path) -> bool {
     std::fs::read(a).unwrap() == std::fs::read(b).unwrap()
 }
 
-fn depth_mm(path: &Path) -> Vec<u16> {
+pub fn depth_mm(path: &Path) -> Vec<u16> {
     match image::open(path).unwrap() {
         image::DynamicImage::ImageLuma16(image) => image.into_raw(),
         other => panic!("{:?}", other.color()),
@@ -78,7 +78,7 @@ fn depth_mm(path: &Path) -> Vec<u16> {
 }
 
 /// Largest distance of two sets of poses, metres and degrees.
-fn apart(a: &[Pose], b: &[Pose]) -> (f64, f64) {
+pub fn apart(a: &[Pose], b: &[Pose]) -> (f64, f64) {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).fold((0.0, 0.0), |(m, deg), (a, b)| {
         let distance = (a.translation.vector - b.translation.vector).norm();
@@ -459,7 +459,7 @@ fn hands_of_which_nobody_says_whether_they_hold_are_told_as_such() {
 }
 
 /// Breaks a source and expects `paws import` to name all of `words`, and to leave nothing behind.
-fn refused(name: &str, words: &[&str], break_it: impl Fn(&Path)) {
+pub fn refused(name: &str, words: &[&str], break_it: impl Fn(&Path)) {
     let dir = tempfile::tempdir().unwrap();
     break_it(dir.path());
     let out = paws(&["import", "source", "--out", "out"], dir.path());
@@ -472,7 +472,7 @@ fn refused(name: &str, words: &[&str], break_it: impl Fn(&Path)) {
 }
 
 /// Replaces a text in a file.
-fn edit(path: &Path, from: &str, to: &str) {
+pub fn edit(path: &Path, from: &str, to: &str) {
     let text = std::fs::read_to_string(path).unwrap();
     assert!(text.contains(from), "{from}");
     std::fs::write(path, text.replacen(from, to, 1)).unwrap();

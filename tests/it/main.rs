@@ -11,6 +11,7 @@ mod foreign;
 mod formats;
 mod honesty;
 mod import;
+mod import_devices;
 mod known_truth;
 mod mjcf;
 mod models;

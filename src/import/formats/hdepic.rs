@@ -254,13 +254,12 @@ fn first_word(list: &str) -> String {
     first.trim().trim_matches(['\'', '"']).to_owned()
 }
 
-/// The glasses' time of a time of the video: between two pictures, else that of the first or last one.
+/// The glasses' time of a time of the video: between two pictures, before the first and behind the last one at the same pace.
 fn device_time(times: &[[f64; 2]], secs: f64) -> Option<f64> {
     let after = times.partition_point(|[mp4, _]| *mp4 < secs);
-    let next = times.get(after);
-    match (after.checked_sub(1).and_then(|i| times.get(i)), next) {
+    match (after.checked_sub(1).and_then(|i| times.get(i)), times.get(after)) {
         (Some([a, from]), Some([b, to])) if b > a => Some(from + (to - from) * (secs - a) / (b - a)),
-        (Some([_, device]), _) | (None, Some([_, device])) => Some(*device),
+        (Some([mp4, device]), _) | (None, Some([mp4, device])) => Some(device + (secs - mp4)),
         (None, None) => None,
     }
 }
@@ -272,7 +271,7 @@ mod tests {
     #[test]
     fn times_of_the_video_become_the_glasses() {
         let times = [[0.0, 100.0], [1.0, 102.0], [2.0, 103.0]];
-        for (secs, device) in [(-1.0, 100.0), (0.0, 100.0), (0.5, 101.0), (1.5, 102.5), (9.0, 103.0)] {
+        for (secs, device) in [(-1.0, 99.0), (0.0, 100.0), (0.5, 101.0), (1.5, 102.5), (9.0, 110.0)] {
             assert_eq!(device_time(&times, secs), Some(device), "{secs}");
         }
         assert_eq!(device_time(&[], 1.0), None);

@@ -96,11 +96,11 @@ fn head(path: &Path) -> Result<(Vec<PoseAt>, f64)> {
         let turn = Turn::Quaternion(row.numbers(["rot_x", "rot_y", "rot_z", "rot_w"])?);
         items.push(PoseAt { at: At::time(running), pose: RawPose { position, turn }, optics: None });
     }
-    // Milliseconds are cut, not rounded: the mean of both is half of one later.
+    // Milliseconds are cut, not rounded, here as in the names of images: the median holds for both.
     let Some(offset) = stats::median(&offsets) else {
         return Err(Error::format(path, "rows", "there is no pose; was the recording stopped at once?"));
     };
-    Ok((items, offset - 0.0005))
+    Ok((items, offset))
 }
 
 /// A number of a JSON file by its way.

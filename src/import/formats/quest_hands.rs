@@ -105,7 +105,7 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
                 let values = numbers(&lines, text, 3 * JOINTS)?;
                 // The wrist of the same packet stands in the line before; one wrist serves one hand.
                 let Some(wrist) = wrists.remove(&side) else { continue };
-                let joint = |p: &[f64]| {
+                let joint = |p: &[f64]| -> Option<[f64; 3]> {
                     let [x, y, z] = *p else { return None };
                     Some((wrist.translation.vector + wrist.rotation * Vector::new(x, y, z)).into())
                 };

@@ -126,7 +126,7 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
 
 /// A matrix of a file, column by column; `None` where it is not 16 finite numbers.
 fn matrix(json: &Value) -> Option<Matrix4<f64>> {
-    let values: Vec<f64> = json.as_array()?.iter().filter_map(Value::as_f64).collect();
+    let values: Vec<f64> = json.as_array()?.iter().map(Value::as_f64).collect::<Option<_>>()?;
     (values.len() == 16).then(|| Matrix4::from_column_slice(&values))
 }
 
