@@ -18,7 +18,7 @@ use crate::import::{Options, axes, video};
 use crate::math::{Pose, Vector};
 
 /// Folders that exporters put the colour images in.
-const IMAGES: [&str; 6] = ["rgb", "images", "frames", "camera-rgb", "214-1", "rectified_rgb"];
+const IMAGES: [&str; 5] = ["rgb", "images", "frames", "camera-rgb", "214-1"];
 /// The clock of all streams.
 const CLOCK: &str = "aria device";
 /// Calibration files of our exporter and of HD-EPIC's tools.
