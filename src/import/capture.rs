@@ -64,11 +64,49 @@ impl At {
     }
 }
 
+/// How the bytes of an image without a header stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PixelCoding {
+    /// Red, green, blue, one that says nothing; a byte each.
+    Rgba {
+        /// Whether the first row is the lowest one.
+        is_bottom_up: bool,
+    },
+    /// Blue, green, red, one that says nothing; a byte each, the top row first.
+    Bgra,
+    /// Red, green, blue; a byte each, the top row first.
+    Rgb,
+    /// Blue, green, red; a byte each, the top row first.
+    Bgr,
+    /// Grey, the top row first.
+    Grey,
+    /// Brightness, then blue and red differences at half the size (Android's YUV_420_888, full range), the top row first.
+    Yuv420 {
+        /// First byte of each plane.
+        offsets: [usize; 3],
+        /// Bytes from one row to the next, of each plane.
+        rows: [usize; 3],
+        /// Bytes from one pixel to the next, of each plane.
+        steps: [usize; 3],
+    },
+}
+
 /// Where a picture's pixels are.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Picture {
     /// A JPEG or PNG, told by its content.
     Still(Blob),
+    /// Pixels without a header.
+    Raw {
+        /// Their bytes.
+        blob: Blob,
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+        /// How they stand.
+        coding: PixelCoding,
+    },
     /// A frame of a video file.
     Video {
         /// The file.
@@ -78,44 +116,6 @@ pub enum Picture {
         /// Whether the rotation in the file's metadata is applied. No where intrinsics and poses are the sensor's.
         upright: bool,
     },
-    /// Rows of pixels as they are.
-    Raw {
-        /// The bytes.
-        blob: Blob,
-        /// Columns.
-        width: usize,
-        /// Rows.
-        height: usize,
-        /// What a pixel's bytes are.
-        pixels: Pixels,
-    },
-}
-
-/// Order of a raw pixel's bytes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Pixels {
-    /// Grey.
-    Grey,
-    /// Red, green, blue.
-    Rgb,
-    /// Blue, green, red.
-    Bgr,
-    /// Red, green, blue and a byte that counts for nothing.
-    Rgba,
-    /// Blue, green, red and a byte that counts for nothing.
-    Bgra,
-}
-
-impl Pixels {
-    /// Bytes of a pixel.
-    #[must_use]
-    pub fn bytes(self) -> usize {
-        match self {
-            Self::Grey => 1,
-            Self::Rgb | Self::Bgr => 3,
-            Self::Rgba | Self::Bgra => 4,
-        }
-    }
 }
 
 /// A colour image at a time.
@@ -176,6 +176,18 @@ pub enum DepthCoding {
         height: usize,
         /// Byte order.
         order: ByteOrder,
+    },
+    /// Rows of float32, least significant byte first, as a renderer's depth buffer has them: 0 at the near plane, 1 at the
+    /// far one.
+    BufferF32 {
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+        /// Distance of the near plane, metres.
+        near_m: f64,
+        /// Distance of the far plane, metres; may be infinite.
+        far_m: f64,
     },
     /// Rows of unsigned 16-bit numbers.
     RawU16 {

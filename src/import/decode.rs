@@ -2,10 +2,10 @@
 
 use std::io::Cursor;
 
-use image::{DynamicImage, ImageReader};
+use image::{DynamicImage, ImageReader, RgbImage};
 
 use super::blob::Blob;
-use super::capture::{ByteOrder, Depth, DepthCoding, Pixels};
+use super::capture::{ByteOrder, Depth, DepthCoding, PixelCoding};
 use crate::error::{Error, Result};
 use crate::recording::{Grid, images};
 
@@ -35,30 +35,63 @@ pub fn picture(blob: &Blob) -> Result<DynamicImage> {
     DynamicImage::from_decoder(decoder).map_err(wrong)
 }
 
-/// An image of raw pixels.
+/// An image of pixels without a header.
 ///
 /// # Errors
-/// Where there are more or fewer bytes than pixels.
-pub fn raw_picture(blob: &Blob, width: usize, height: usize, pixels: Pixels) -> Result<DynamicImage> {
+/// Where the bytes cannot be read or are fewer than the size needs.
+pub fn pixels(blob: &Blob, width: usize, height: usize, coding: PixelCoding) -> Result<RgbImage> {
     let bytes = blob.read()?;
-    let expected = width.checked_mul(height).filter(|n| *n <= MAX_PIXELS).map(|n| n * pixels.bytes());
-    let wrong = || {
-        let of = pixels.bytes();
-        blob.fault(format!("has {} bytes; {width} x {height} pixels of {of} bytes were expected", bytes.len()))
-    };
-    if expected != Some(bytes.len()) {
-        return Err(wrong());
+    let short = || blob.fault(format!("has {} bytes, too few for an image of {width} x {height} pixels", bytes.len()));
+    let count = width.checked_mul(height).filter(|n| (1..=MAX_PIXELS).contains(n)).ok_or_else(short)?;
+    let mut data = Vec::with_capacity(3 * count);
+    for y in 0..height {
+        for x in 0..width {
+            let rgb = match coding {
+                PixelCoding::Rgba { is_bottom_up } => {
+                    let row = if is_bottom_up { height - 1 - y } else { y };
+                    bytes.get(4 * (row * width + x)..).and_then(|b| Some([*b.first()?, *b.get(1)?, *b.get(2)?]))
+                }
+                PixelCoding::Bgra => {
+                    bytes.get(4 * (y * width + x)..).and_then(|b| Some([*b.get(2)?, *b.get(1)?, *b.first()?]))
+                }
+                PixelCoding::Rgb => {
+                    bytes.get(3 * (y * width + x)..).and_then(|b| Some([*b.first()?, *b.get(1)?, *b.get(2)?]))
+                }
+                PixelCoding::Bgr => {
+                    bytes.get(3 * (y * width + x)..).and_then(|b| Some([*b.get(2)?, *b.get(1)?, *b.first()?]))
+                }
+                PixelCoding::Grey => bytes.get(y * width + x).map(|v| [*v; 3]),
+                PixelCoding::Yuv420 { offsets, rows, steps } => {
+                    let at = |plane: usize, x: usize, y: usize| {
+                        let row = y.checked_mul(*rows.get(plane)?)?;
+                        let step = x.checked_mul(*steps.get(plane)?)?;
+                        bytes.get(offsets.get(plane)?.checked_add(row)?.checked_add(step)?).copied()
+                    };
+                    yuv(at(0, x, y), at(1, x / 2, y / 2), at(2, x / 2, y / 2))
+                }
+            };
+            data.extend(rgb.ok_or_else(short)?);
+        }
     }
-    let rgb: Vec<u8> = match pixels {
-        Pixels::Grey => bytes.iter().flat_map(|v| [*v; 3]).collect(),
-        Pixels::Rgb | Pixels::Rgba => {
-            bytes.chunks_exact(pixels.bytes()).flat_map(|c| c.iter().take(3).copied()).collect()
-        }
-        Pixels::Bgr | Pixels::Bgra => {
-            bytes.chunks_exact(pixels.bytes()).flat_map(|c| c.iter().take(3).rev().copied()).collect()
-        }
-    };
-    image::RgbImage::from_raw(width as u32, height as u32, rgb).map(DynamicImage::ImageRgb8).ok_or_else(wrong)
+    RgbImage::from_raw(width as u32, height as u32, data).ok_or_else(short)
+}
+
+/// A colour from brightness and its blue and red differences, full range (BT.601).
+fn yuv(y: Option<u8>, u: Option<u8>, v: Option<u8>) -> Option<[u8; 3]> {
+    let (y, u, v) = (f64::from(y?), f64::from(u?) - 128.0, f64::from(v?) - 128.0);
+    let rgb = [y + 1.402 * v, y - 0.344_136 * u - 0.714_136 * v, y + 1.772 * u];
+    Some(rgb.map(|c| c.round().clamp(0.0, 255.0) as u8))
+}
+
+/// Metres of a value of a depth buffer; not finite at the far plane of a room without end.
+fn unprojected(value: f32, near_m: f64, far_m: f64) -> f32 {
+    let value = f64::from(value);
+    // 0 is written where nothing was measured as well.
+    if value <= 0.0 {
+        return 0.0;
+    }
+    let share_of_far = if far_m.is_finite() { near_m / far_m } else { 0.0 };
+    (near_m / (1.0 - value * (1.0 - share_of_far))) as f32
 }
 
 /// Values of 8 bits of a grey image, or one byte a pixel of a raw array of a known size.
@@ -102,6 +135,9 @@ pub fn depth(blob: &Blob, confidence: Option<&Blob>, how: &Depth) -> Result<Grid
                 ByteOrder::Little => f32::from_le_bytes([a, b, c, d]),
                 ByteOrder::Big => f32::from_be_bytes([a, b, c, d]),
             })?
+        }
+        DepthCoding::BufferF32 { width, height, near_m, far_m } => {
+            raw(blob, width, height, |bytes: [u8; 4]| unprojected(f32::from_le_bytes(bytes), near_m, far_m))?
         }
         DepthCoding::RawU16 { width, height, order, unit_m } => raw(blob, width, height, |[a, b]: [u8; 2]| {
             let count = match order {
@@ -351,20 +387,38 @@ mod tests {
         }
     }
 
+    /// near / (1 - d) for a far plane without end; `-2 far near / (far - near) / (2 d - 1 - (far + near) / (far - near))` else.
     #[test]
-    fn raw_pixels_become_red_green_blue() {
-        let cases: [(Pixels, &[u8]); 4] = [
-            (Pixels::Rgb, &[1, 2, 3, 4, 5, 6]),
-            (Pixels::Bgr, &[3, 2, 1, 6, 5, 4]),
-            (Pixels::Rgba, &[1, 2, 3, 0, 4, 5, 6, 0]),
-            (Pixels::Bgra, &[3, 2, 1, 0, 6, 5, 4, 0]),
-        ];
-        for (pixels, bytes) in cases {
-            let image = raw_picture(&inline(bytes), 2, 1, pixels).unwrap().into_rgb8();
-            assert_eq!(image.into_raw(), [1, 2, 3, 4, 5, 6], "{pixels:?}");
-            assert!(raw_picture(&inline(bytes), 3, 1, pixels).is_err());
-        }
-        assert_eq!(raw_picture(&inline(&[7]), 1, 1, Pixels::Grey).unwrap().into_rgb8().into_raw(), [7, 7, 7]);
+    fn depth_buffers_become_metres() {
+        let floats: Vec<u8> = [0.0f32, 0.9, 1.0, 0.95].iter().flat_map(|v| v.to_le_bytes()).collect();
+        let coding = DepthCoding::BufferF32 { width: 4, height: 1, near_m: 0.1, far_m: f64::INFINITY };
+        let out = depth(&inline(&floats), None, &how(coding)).unwrap().data;
+        assert!(
+            out[0] == 0.0 && (out[1] - 1.0).abs() < 1e-5 && out[2] == 0.0 && (out[3] - 2.0).abs() < 1e-5,
+            "{out:?}"
+        );
+        let coding = DepthCoding::BufferF32 { width: 4, height: 1, near_m: 0.1, far_m: 10.0 };
+        let out = depth(&inline(&floats), None, &how(coding)).unwrap().data;
+        let (near, far) = (0.1, 10.0);
+        let formula = -2.0 * far * near / (far - near) / (2.0 * 0.9 - 1.0 - (far + near) / (far - near));
+        assert!((f64::from(out[1]) - formula).abs() < 1e-5 && (out[2] - 10.0).abs() < 1e-4, "{out:?}");
+    }
+
+    #[test]
+    fn pixels_without_a_header_have_their_order() {
+        let bytes = inline(&[1, 2, 3, 9, 4, 5, 6, 9]);
+        let image = |coding| pixels(&bytes, 1, 2, coding).unwrap().into_raw();
+        assert_eq!(image(PixelCoding::Rgba { is_bottom_up: true }), [4, 5, 6, 1, 2, 3]);
+        assert_eq!(image(PixelCoding::Rgba { is_bottom_up: false }), [1, 2, 3, 4, 5, 6]);
+        assert_eq!(image(PixelCoding::Bgra), [3, 2, 1, 6, 5, 4]);
+        assert_eq!(image(PixelCoding::Rgb), [1, 2, 3, 9, 4, 5]);
+        assert_eq!(image(PixelCoding::Bgr), [3, 2, 1, 5, 4, 9]);
+        assert_eq!(image(PixelCoding::Grey), [1, 1, 1, 2, 2, 2]);
+        let planes = PixelCoding::Yuv420 { offsets: [0, 4, 5], rows: [2, 1, 1], steps: [1, 1, 1] };
+        let grey = pixels(&inline(&[10, 20, 30, 40, 128, 128]), 2, 2, planes).unwrap();
+        assert_eq!(grey.into_raw(), [10, 10, 10, 20, 20, 20, 30, 30, 30, 40, 40, 40]);
+        let error = pixels(&bytes, 2, 2, PixelCoding::Bgra).unwrap_err().to_string();
+        assert!(error.contains("8 bytes") && error.contains("2 x 2"), "{error}");
     }
 
     #[test]

@@ -285,8 +285,8 @@ impl Imported {
             }
         };
         let name = format!("frames/{frame:06}.jpg");
-        let is_raw = matches!(source.picture, Picture::Raw { .. });
-        if self.view.is_same(&f.optics) && !is_raw {
+        let is_file = !matches!(source.picture, Picture::Raw { .. });
+        if is_file && self.view.is_same(&f.optics) {
             let bytes = blob.read().map_err(named)?;
             let is_jpeg = bytes.starts_with(&[0xFF, 0xD8, 0xFF]);
             let size = image::ImageReader::new(std::io::Cursor::new(&bytes))
@@ -298,10 +298,9 @@ impl Imported {
             }
         }
         let image = match &source.picture {
-            Picture::Raw { blob, width, height, pixels } => decode::raw_picture(blob, *width, *height, *pixels)?,
-            Picture::Still(_) | Picture::Video { .. } => decode::picture(&blob).map_err(named)?,
+            Picture::Raw { width, height, coding, .. } => decode::pixels(&blob, *width, *height, *coding)?,
+            Picture::Still(_) | Picture::Video { .. } => decode::picture(&blob).map_err(named)?.into_rgb8(),
         };
-        let image = image.into_rgb8();
         let (width, height) = (image.width() as usize, image.height() as usize);
         if !f.optics.has_shape(width, height) {
             let file = match &source.picture {

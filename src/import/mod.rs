@@ -30,6 +30,7 @@ pub mod ply;
 pub mod poses;
 pub mod report;
 pub mod ros;
+pub mod tar;
 pub mod text;
 pub mod tf;
 pub mod video;

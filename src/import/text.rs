@@ -1,9 +1,12 @@
 //! Text tables: bounded lines, numbers and columns, with errors that name the file and the place.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
+
+use flate2::bufread::MultiGzDecoder;
 
 use crate::error::{Error, Result};
 
@@ -11,20 +14,23 @@ use crate::error::{Error, Result};
 const MAX_LINE_BYTES: usize = 1 << 20;
 
 /// Lines of a text file, one at a time.
-pub struct Lines<R = BufReader<File>> {
+pub struct Lines<R = Box<dyn BufRead>> {
     reader: R,
     path: PathBuf,
     number: usize,
 }
 
 impl Lines {
-    /// Of a file.
+    /// Of a file; one that is gzip by its content is unpacked on the way.
     ///
     /// # Errors
     /// Where it cannot be opened.
     pub fn open(path: &Path) -> Result<Self> {
-        let file = File::open(path).map_err(|e| Error::io(path, &e))?;
-        Ok(Self::of(BufReader::new(file), path))
+        let mut file = BufReader::new(File::open(path).map_err(|e| Error::io(path, &e))?);
+        let is_packed = file.fill_buf().map_err(|e| Error::io(path, &e))?.starts_with(&[0x1f, 0x8b]);
+        let reader: Box<dyn BufRead> =
+            if is_packed { Box::new(BufReader::new(MultiGzDecoder::new(file))) } else { Box::new(file) };
+        Ok(Self::of(reader, path))
     }
 }
 
@@ -43,8 +49,8 @@ impl<R: BufRead> Lines<R> {
         self.number += 1;
         let mut bytes = Vec::new();
         let limit = MAX_LINE_BYTES as u64 + 1;
-        let read =
-            self.reader.by_ref().take(limit).read_until(b'\n', &mut bytes).map_err(|e| Error::io(&self.path, &e))?;
+        let read = self.reader.by_ref().take(limit).read_until(b'\n', &mut bytes);
+        let read = read.map_err(|e| self.fault(format!("cannot be read ({e}); was the file copied as a whole?")))?;
         if read == 0 {
             return Ok(None);
         }
@@ -149,10 +155,10 @@ fn split(line: &str, separator: Option<char>) -> Vec<&str> {
 }
 
 /// A cell without the quotes about it; two quotes within are one.
-fn unquoted(cell: &str) -> String {
+fn unquoted(cell: &str) -> Cow<'_, str> {
     match cell.strip_prefix('"').and_then(|c| c.strip_suffix('"')) {
-        Some(inner) => inner.replace("\"\"", "\""),
-        None => cell.to_owned(),
+        Some(inner) => Cow::Owned(inner.replace("\"\"", "\"")),
+        None => Cow::Borrowed(cell),
     }
 }
 
@@ -168,7 +174,10 @@ pub struct Table {
 /// A row of a [`Table`].
 pub struct Row<'a> {
     table: &'a Table,
-    cells: Vec<String>,
+    /// The cells without their quotes, one behind the other.
+    content: String,
+    /// First byte of each cell in it, and the first one behind.
+    bounds: Vec<(usize, usize)>,
 }
 
 impl Table {
@@ -213,14 +222,21 @@ impl Table {
     /// Where a row has another number of cells than the header.
     pub fn row(&mut self) -> Result<Option<Row<'_>>> {
         let Some(line) = self.lines.content()? else { return Ok(None) };
-        let cells: Vec<String> = split(&line, self.separator).into_iter().map(unquoted).collect();
-        if cells.len() != self.header.len() {
-            let (found, expected) = (cells.len(), self.header.len());
+        // A table may have millions of rows: no text of its own for each cell.
+        let mut content = String::with_capacity(line.len());
+        let mut bounds = Vec::with_capacity(self.header.len());
+        for cell in split(&line, self.separator) {
+            let start = content.len();
+            content.push_str(&unquoted(cell));
+            bounds.push((start, content.len()));
+        }
+        if bounds.len() != self.header.len() {
+            let (found, expected) = (bounds.len(), self.header.len());
             return Err(self.lines.fault(format!(
                 "{found} cells, the header has {expected}; a file that ends early is a copy that was not finished"
             )));
         }
-        Ok(Some(Row { table: self, cells }))
+        Ok(Some(Row { table: self, content, bounds }))
     }
 }
 
@@ -228,7 +244,8 @@ impl Row<'_> {
     /// A cell's text; empty where there is no such column.
     #[must_use]
     pub fn text(&self, column: &str) -> &str {
-        self.table.columns.get(column).and_then(|i| self.cells.get(*i)).map_or("", String::as_str)
+        let bounds = self.table.columns.get(column).and_then(|i| self.bounds.get(*i));
+        bounds.and_then(|(start, end)| self.content.get(*start..*end)).unwrap_or_default()
     }
 
     /// A finite number.
@@ -316,6 +333,30 @@ mod tests {
             let error = read().unwrap_err().to_string();
             assert!(error.contains(word) && error.contains("t.csv"), "{error}");
         }
+    }
+
+    #[test]
+    fn packed_tables_are_read_as_they_are() {
+        use std::io::Write as _;
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("t.csv.gz");
+        let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        packer.write_all(b"a,b\n1,2\n3,4\n").unwrap();
+        let bytes = packer.finish().unwrap();
+        std::fs::write(&path, &bytes).unwrap();
+        let mut table = Table::open(&path).unwrap();
+        assert_eq!(table.row().unwrap().unwrap().numbers(["b", "a"]).unwrap(), [2.0, 1.0]);
+        assert_eq!(table.row().unwrap().unwrap().number("a").unwrap(), 3.0);
+        assert!(table.row().unwrap().is_none());
+        // Without its end.
+        std::fs::write(&path, &bytes[..bytes.len() - 6]).unwrap();
+        let read = || -> Result<()> {
+            let mut table = Table::open(&path)?;
+            while table.row()?.is_some() {}
+            Ok(())
+        };
+        let error = read().unwrap_err().to_string();
+        assert!(error.contains("t.csv.gz") && error.contains("copied as a whole"), "{error}");
     }
 
     #[test]

@@ -86,6 +86,19 @@ pub fn times(ffmpeg: Option<&Path>, file: &Path) -> Result<Vec<f64>> {
     Ok(times)
 }
 
+/// Columns and rows of a file's pictures as they are shown; `None` where ffprobe is not there or finds no video.
+#[must_use]
+pub fn size(ffmpeg: Option<&Path>, file: &Path) -> Option<[usize; 2]> {
+    let ffprobe = program(ffmpeg, "ffprobe");
+    let mut command = Command::new(&ffprobe);
+    command.args(["-v", "error", "-select_streams", "v:0", "-show_entries", "stream=width,height", "-of", "csv=p=0"]);
+    command.arg(argument(file));
+    let text = run(&ffprobe, &mut command, file).ok()?;
+    let text = String::from_utf8_lossy(&text);
+    let mut numbers = text.lines().next()?.split(',').map(|n| n.trim().parse::<usize>().ok());
+    Some([numbers.next()??, numbers.next()??])
+}
+
 /// ffmpeg's words for a set of frames: equal steps are one term each. `frames` ascends.
 fn expression(frames: &[usize]) -> String {
     let mut terms = Vec::new();

@@ -12,7 +12,9 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use crate::import::Options;
 use crate::import::blob::{Blob, files};
-use crate::import::capture::{Along, At, ByteOrder, Capture, Depth, DepthAt, DepthCoding, ImageAt, Picture, Pixels};
+use crate::import::capture::{
+    Along, At, ByteOrder, Capture, Depth, DepthAt, DepthCoding, ImageAt, Picture, PixelCoding,
+};
 use crate::import::mcap::{Channel, Message, Visitor, Want, scan};
 use crate::import::ros::{self, CameraInfo, Header, Posed};
 use crate::import::tf::Tree;
@@ -182,15 +184,15 @@ fn raw(image: &ros::Image, blob: Blob) -> Content {
         "16UC1" | "mono16" => (2, Content::Depth(DepthCoding::RawU16 { width, height, order, unit_m: 1e-3 }, blob)),
         "32FC1" => (4, Content::Depth(DepthCoding::RawF32 { width, height, order }, blob)),
         other => {
-            let pixels = match other {
-                "mono8" | "8UC1" => Pixels::Grey,
-                "rgb8" => Pixels::Rgb,
-                "bgr8" | "8UC3" => Pixels::Bgr,
-                "rgba8" => Pixels::Rgba,
-                "bgra8" | "8UC4" => Pixels::Bgra,
+            let (bytes, coding) = match other {
+                "mono8" | "8UC1" => (1, PixelCoding::Grey),
+                "rgb8" => (3, PixelCoding::Rgb),
+                "bgr8" | "8UC3" => (3, PixelCoding::Bgr),
+                "rgba8" => (4, PixelCoding::Rgba { is_bottom_up: false }),
+                "bgra8" | "8UC4" => (4, PixelCoding::Bgra),
                 _ => return Content::Unread(format!("pixels of {other}")),
             };
-            (pixels.bytes(), Content::Color(Picture::Raw { blob, width, height, pixels }))
+            (bytes, Content::Color(Picture::Raw { blob, width, height, coding }))
         }
     };
     if width.checked_mul(bytes) == Some(image.step) {

@@ -3,6 +3,10 @@
 //! A reader fills a [`Capture`] with what the files hold and declares it; it converts nothing. It reads tables at once and
 //! leaves images as blobs. Its errors name file, place and way out. `detect` looks at names and first lines only.
 
+mod aria;
+mod aria_camera;
+mod aria_depth;
+mod aria_walk;
 mod arkitscenes;
 mod arti4d;
 mod cloud;
@@ -15,6 +19,8 @@ mod frames;
 mod grounded_sam;
 mod hands;
 mod hands23;
+mod hdepic;
+mod hololens;
 mod lines2d;
 mod mapanything;
 mod mcap;
@@ -22,11 +28,14 @@ mod moge;
 mod narrations;
 mod nerfstudio;
 mod polycam;
+mod quest;
+mod quest_hands;
 mod record3d;
 mod stera;
 mod stray;
 mod subtitles;
 mod tum;
+mod visionpro;
 mod wilor;
 
 use std::path::Path;
@@ -99,6 +108,48 @@ pub const ALL: &[Format] = &[
         holds: "poses, intrinsics, hands",
         detect: ego_vision::detect,
         read: ego_vision::read,
+    },
+    Format {
+        name: "aria",
+        title: "Project Aria glasses with MPS results; Aria Gen 2 pilot recordings",
+        holds: "poses, hands, points, images or depth beside it",
+        detect: aria::detect,
+        read: aria::read,
+    },
+    Format {
+        name: "hdepic",
+        title: "HD-EPIC: a trajectory of its tools, or a storage folder with one video",
+        holds: "poses, images, points, narrations",
+        detect: hdepic::detect,
+        read: hdepic::read,
+    },
+    Format {
+        name: "hololens",
+        title: "HoloLens 2 recording of StreamRecorder (HoloLens2ForCV)",
+        holds: "poses, images, depth, hands",
+        detect: hololens::detect,
+        read: hololens::read,
+    },
+    Format {
+        name: "quest",
+        title: "Quest 3 recording of QuestRealityCapture",
+        holds: "poses, images, depth",
+        detect: quest::detect,
+        read: quest::read,
+    },
+    Format {
+        name: "quest-hands",
+        title: "Hand Tracking Streamer (Quest), its lines in a text file",
+        holds: "hands, poses of the head",
+        detect: quest_hands::detect,
+        read: quest_hands::read,
+    },
+    Format {
+        name: "visionpro",
+        title: "Vision Pro recording of Tracking Streamer",
+        holds: "poses, hands, images",
+        detect: visionpro::detect,
+        read: visionpro::read,
     },
     Format {
         name: "colmap",

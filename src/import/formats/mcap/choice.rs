@@ -5,7 +5,7 @@ use std::path::Path;
 use super::{Bag, Content, Seen};
 use crate::error::{Error, Result};
 use crate::import::Options;
-use crate::import::capture::{Picture, Pixels};
+use crate::import::capture::{Picture, PixelCoding};
 use crate::import::ros::CameraInfo;
 
 /// Topics by which the Stera app's recordings are known.
@@ -38,7 +38,7 @@ pub(super) fn choose<'a>(path: &Path, bag: &'a Bag, options: &Options) -> Result
     let is_stera = bag.images.contains_key(image) && bag.poses.contains_key(pose);
     let color = topic(path, bag, options, "color", is_color, |name, seen| {
         let has = |words: &[&str]| words.iter().any(|w| name.contains(w));
-        let grey = |s: &Seen| matches!(s.content, Content::Color(Picture::Raw { pixels: Pixels::Grey, .. }));
+        let grey = |s: &Seen| matches!(s.content, Content::Color(Picture::Raw { coding: PixelCoding::Grey, .. }));
         let is_named = has(&["rgb", "color", "colour"]) && !has(&["depth"]);
         (is_named, !seen.iter().any(grey), camera(bag, name).is_some(), seen.len())
     })?;
