@@ -54,13 +54,18 @@ impl Occupancy {
             for (cell, views) in &seen {
                 *along.entry(cell[k]).or_default() += u64::from(*views);
             }
-            let rank = (q * along.values().sum::<u64>() as f64) as u64;
-            let mut below = 0;
-            let at = along.iter().find(|(_, views)| {
-                below += **views;
-                below > rank
-            });
-            at.map_or(0, |(at, _)| *at)
+            let at_rank = |rank: u64| {
+                let mut below = 0;
+                let at = along.iter().find(|(_, views)| {
+                    below += **views;
+                    below > rank
+                });
+                at.map_or(0.0, |(at, _)| f64::from(*at))
+            };
+            // As `stats::quantile` has it.
+            let position = q * along.values().sum::<u64>().saturating_sub(1) as f64;
+            let (low, high) = (at_rank(position.floor() as u64), at_rank(position.ceil() as u64));
+            (low + (high - low) * (position - position.floor())) as i32
         };
         let low = [0, 1, 2].map(|k| bound(k, 0.002));
         let size = [0, 1, 2].map(|k| (bound(k, 0.998) - low[k] + 1).max(1) as usize);
