@@ -437,6 +437,47 @@ mod tests {
         Articulation { kind: JointKind::Revolute, axis: -Vector::z(), origin: Point::new(-0.25, 0.0, 0.0) }
     }
 
+    #[test]
+    fn views_eliminated_one_by_one_give_what_the_whole_system_gives() {
+        let views: Vec<OfView> = (0..5)
+            .map(|i| {
+                let x = f64::from(i);
+                OfView {
+                    own: Matrix2::new(9.0 + x, 0.5, 0.5, 7.0),
+                    with_hinge: Matrix2::new(x.sin(), 0.3, x.cos(), -0.2 * x),
+                    rhs: Vector2::new(0.4 - x, 0.1 * x),
+                }
+            })
+            .collect();
+        let equations = Equations {
+            hinge: Matrix2::new(20.0, 1.0, 1.0, 30.0),
+            hinge_rhs: Vector2::new(1.0, -2.0),
+            views,
+            points: 0,
+        };
+        let size = 2 + 2 * equations.views.len();
+        let (mut matrix, mut vector) = (nalgebra::DMatrix::zeros(size, size), nalgebra::DVector::zeros(size));
+        matrix.view_mut((0, 0), (2, 2)).copy_from(&equations.hinge);
+        vector.rows_mut(0, 2).copy_from(&equations.hinge_rhs);
+        for (i, view) in equations.views.iter().enumerate() {
+            let at = 2 + 2 * i;
+            matrix.view_mut((at, at), (2, 2)).copy_from(&view.own);
+            matrix.view_mut((0, at), (2, 2)).copy_from(&view.with_hinge);
+            matrix.view_mut((at, 0), (2, 2)).copy_from(&view.with_hinge.transpose());
+            vector.rows_mut(at, 2).copy_from(&view.rhs);
+        }
+        let whole = matrix.cholesky().unwrap();
+        let (solution, covariance) = (whole.solve(&vector), whole.inverse());
+        let solved = equations.solved().unwrap();
+        assert!((solved.hinge - solution.rows(0, 2)).norm() < 1e-12);
+        assert!((solved.hinge_cov - covariance.view((0, 0), (2, 2))).norm() < 1e-12);
+        for (i, (step, variance)) in solved.views.iter().zip(&solved.opening_vars).enumerate() {
+            let at = 2 + 2 * i;
+            assert!((step - solution.rows(at, 2)).norm() < 1e-12);
+            assert!((variance - covariance[(at, at)]).abs() < 1e-12);
+        }
+    }
+
     /// The fit of `believed` to one view of `joint` at `opening`, of which the hand tells `told`.
     fn fitted(joint: &Articulation, opening: f64, believed: &Articulation, told: f64, eye: Point) -> Option<Refit> {
         let pose = drawn::pose(eye);
