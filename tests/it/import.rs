@@ -17,7 +17,7 @@ use serde_json::Value;
 use crate::common::{SMALL, paws, stderr};
 
 /// Frames that a test writes: enough to join, few enough to be quick.
-pub(crate) const FRAMES: usize = 24;
+pub(crate) const FRAMES: usize = 48;
 
 pub(crate) fn small() -> Recording {
     Recording::open(SMALL.path()).unwrap()
@@ -539,7 +539,7 @@ fn broken_sources_are_named() {
         write_colmap(&d.join("source"), false, 1.0);
         write(&d.join("source/sparse/0/cameras.txt"), "1 FOV 160 120 100 100 80 60 0.9\n");
     });
-    refused("half a file", &["images.bin: image 24", "copied as a whole"], |d| {
+    refused("half a file", &["images.bin: image 48", "copied as a whole"], |d| {
         write_colmap(&d.join("source"), true, 1.0);
         let file = d.join("source/sparse/0/images.bin");
         let bytes = std::fs::read(&file).unwrap();

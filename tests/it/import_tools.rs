@@ -380,7 +380,7 @@ fn wilors_hands_go_where_the_cameras_own_focal_length_has_them() {
         truth.push((hand.frame, hand.side, tips));
     }
     assert!(!truth.is_empty());
-    import(&["work", "wilor", "--fps", "0", "--scale", "1", "--up", "z"], dir.path());
+    import(&["work", "wilor", "--fps", "0", "--scale", "1"], dir.path());
     let out = dir.path().join("out");
     let table = std::fs::read_to_string(out.join("fingertips.csv")).unwrap();
     let cameras = poses(&out);
@@ -419,7 +419,7 @@ fn masks_and_segments_come_by_the_images_names() {
     );
     write(&dir.path().join("limap/segments/segments_7.txt"), "2\n10 20 30 40\n5.5 6.5 7.5 8.5\n");
     write(&dir.path().join("limap/image_list.txt"), "number of images, 1\n7, images/000004.jpg\n");
-    let text = import(&["work", "sam", "limap", "--fps", "0", "--scale", "1", "--up", "z"], dir.path());
+    let text = import(&["work", "sam", "limap", "--fps", "0", "--scale", "1"], dir.path());
     let out = dir.path().join("out");
     let mask = image::open(out.join("masks/000004.png")).unwrap().into_luma8();
     assert_eq!((mask.get_pixel(39, 7).0, mask.get_pixel(40, 7).0), ([1], [0]));
@@ -455,7 +455,7 @@ fn a_cloud_gives_a_world_without_points_its_scale() {
 fn mapanythings_models_are_in_metres() {
     let dir = tempfile::tempdir().unwrap();
     let truth = write_colmap(&dir.path().join("work"), true, 1.0);
-    import(&["mapanything=work", "--fps", "0", "--up", "z"], dir.path());
+    import(&["mapanything=work", "--fps", "0"], dir.path());
     let found = poses(&dir.path().join("out"));
     let span = |p: &[Pose]| (p[FRAMES - 1].translation.vector - p[0].translation.vector).norm();
     assert!((span(&found) - span(&truth)).abs() < 1e-6);

@@ -43,9 +43,9 @@ fn what_mujoco_refuses_does_not_load_without_a_word() {
         ("mesh_missing", "nowhere.obj: there is no such file"),
         ("plane_body", "a plane may only stand still"),
         ("texture_missing", "no.png: there is no such file"),
-        ("typo_elem", "line 8, <goem>: MJCF has no such element"),
+        ("typo_elem", "line 8, <goem name=\"x\">: MJCF has no such element"),
         ("unknown_attr", "has no attribute \"apirate\""),
-        ("unknown_elem", "<region>: MJCF has no such element"),
+        ("unknown_elem", "<region name=\"r\">: MJCF has no such element"),
     ] {
         let one = point(&format!("12_mjcf/{name}.xml"), 1);
         assert_eq!(one.verdict, Verdict::Fail, "{name}");

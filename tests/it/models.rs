@@ -36,7 +36,7 @@ fn what_simulators_refuse_of_a_urdf_is_a_fault() {
         ("empty_geometry", 1, "has no geometry: MuJoCo refuses"),
         ("two_axes", 1, "<axis> is there twice"),
         ("two_limits", 1, "<limit> is there twice"),
-        ("visual_only", 5, "no hand can touch it"),
+        ("visual_only", 5, "none of its part's shapes takes part in contacts"),
     ] {
         let model = model::read(&data(&format!("urdf/{name}.urdf"))).unwrap();
         let found = faults(&check::model(&model, None));
