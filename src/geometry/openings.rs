@@ -143,9 +143,7 @@ pub fn refit(face: &Face, rect: &Rect, joint: &Articulation, clips: &[OpenState]
         let step =
             normal_equations(&leaf, joint, &moved, [&e1, &e2], shift, &flat, &flat_offsets, &shared, scale, noise);
         let solved = step.solved()?;
-        for k in 0..2 {
-            shift[k] += solved.hinge[k];
-        }
+        shift.iter_mut().zip(solved.hinge.iter()).for_each(|(shift, change)| *shift += change);
         for (offset, change) in offsets.iter_mut().flatten().zip(&solved.views) {
             *offset += change[0];
         }

@@ -132,7 +132,7 @@ fn told_changes(timeline: &Timeline, view: &View, options: &Options, report: &mu
             c.height
         ));
     }
-    if options.rotate_quarters % 4 != 0 {
+    if !options.rotate_quarters.is_multiple_of(4) {
         report
             .changes
             .push(format!("images are turned clockwise by {} degrees", 90 * u32::from(options.rotate_quarters % 4)));

@@ -37,7 +37,7 @@ impl View {
             _ => (w, h, optics.fx, optics.fy, optics.cx, optics.cy),
         };
         let limit_deg = options.fov_deg.or(optics.is_fisheye().then_some(FISHEYE_FOV_DEG));
-        let seen_deg = if quarters % 2 == 0 {
+        let seen_deg = if quarters.is_multiple_of(2) {
             field_deg(optics, [(-0.5, optics.cy), (w - 0.5, optics.cy)])
         } else {
             field_deg(optics, [(optics.cx, -0.5), (optics.cx, h - 0.5)])

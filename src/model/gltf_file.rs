@@ -79,8 +79,11 @@ fn word(bytes: &[u8], at: usize) -> Option<usize> {
     usize::try_from(u32::from_le_bytes(four)).ok()
 }
 
+/// The JSON chunk, the binary one where there is one, and how many bytes follow the stated end.
+type Chunks<'a> = (&'a [u8], Option<&'a [u8]>, usize);
+
 /// The JSON chunk and the binary chunk of a GLB, and how many bytes follow its stated end.
-fn chunks<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>, usize)> {
+fn chunks<'a>(path: &Path, bytes: &'a [u8]) -> Result<Chunks<'a>> {
     let cut = || invalid(path, "it is cut off");
     let (version, length) = (word(bytes, 4).ok_or_else(cut)?, word(bytes, 8).ok_or_else(cut)?);
     if version != 2 {

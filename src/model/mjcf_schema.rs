@@ -207,7 +207,7 @@ mod tests {
         assert_eq!(geom.attributes.get("mesh").unwrap().value, Value::Other("mesh"));
         assert!(ROWS.get("inertial").unwrap().attributes.get("pos").unwrap().required);
         // The same tag is another element in another place.
-        assert!(ROWS.get("default_geom").unwrap().attributes.get("name").is_none());
+        assert!(!ROWS.get("default_geom").unwrap().attributes.contains_key("name"));
     }
 
     #[test]

@@ -70,7 +70,7 @@ pub(super) fn read(source: &Path, _options: &Options) -> Result<Capture> {
         optics,
         poses: Some(Poses { direction: Direction::CameraFromWorld, items: poses, ..Poses::default() }),
         images,
-        depth: (!depth.is_empty()).then(|| Depth {
+        depth: (!depth.is_empty()).then_some(Depth {
             coding: DepthCoding::Png16 { unit_m: 1e-3 },
             along: Along::Z,
             is_metric: true,

@@ -109,7 +109,7 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         optics: Some(color),
         poses: Some(Poses { body_from_camera: Some(base_from_rgb * turn), items: poses, ..Poses::default() }),
         images,
-        depth: (!depth.is_empty()).then(|| Depth {
+        depth: (!depth.is_empty()).then_some(Depth {
             coding: DepthCoding::Png16 { unit_m: 1e-3 },
             along: Along::Z,
             is_metric: true,

@@ -108,7 +108,7 @@ mod tests {
     /// DeepLSD's exporter: an array `lines` of shape (1, 2, 2), rows before columns.
     fn npz() -> Vec<u8> {
         let mut header = "{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2, 2), }".to_owned();
-        while (10 + header.len() + 1) % 64 != 0 {
+        while !(10 + header.len() + 1).is_multiple_of(64) {
             header.push(' ');
         }
         header.push('\n');

@@ -111,7 +111,7 @@ fn table(path: &Path) -> Result<Vec<(String, Row)>> {
         table.need(&TEXT[..1])?;
     }
     let has = |names: &[&str]| known.iter().any(|name| names.contains(name));
-    if !(has(&START) && has(&END)) && !(has(&START_FRAME) && has(&END_FRAME)) {
+    if !(has(&START) && has(&END) || has(&START_FRAME) && has(&END_FRAME)) {
         let missing = if has(&START) { "end" } else { "start" };
         table.need(&[missing])?;
     }

@@ -117,7 +117,7 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         optics: items.first().and_then(|i: &PoseAt| i.optics),
         poses: Some(Poses { axes: CameraAxes::Opengl, items, ..Poses::default() }),
         images,
-        depth: has_depth.then(|| Depth {
+        depth: has_depth.then_some(Depth {
             coding: DepthCoding::Png16 { unit_m },
             along: Along::Z,
             is_metric: true,

@@ -85,7 +85,7 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
         optics: Some(optics),
         poses: Some(Poses { items: poses, ..Poses::default() }),
         images,
-        depth: (!depth.is_empty()).then(|| Depth {
+        depth: (!depth.is_empty()).then_some(Depth {
             coding: DepthCoding::Png16 { unit_m: 1e-3 },
             along: Along::Z,
             is_metric: true,

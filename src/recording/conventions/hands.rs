@@ -44,12 +44,15 @@ struct Witness<'a> {
     sight: Sight<'a>,
 }
 
+/// Where a hand's point lies in the world, of the point as it is written and `world_from_camera`.
+type Place = Box<dyn Fn(&Point, &Pose) -> Point + Send + Sync>;
+
 /// Another meaning of the hands' numbers.
 struct Meaning {
     what: String,
     remedy: String,
     fix: Option<Fix>,
-    place: Box<dyn Fn(&Point, &Pose) -> Point + Send + Sync>,
+    place: Place,
 }
 
 /// Seconds between frames, the median.
