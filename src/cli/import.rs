@@ -23,6 +23,11 @@ const AT_ONCE: usize = 16;
 const MAX_LISTED: usize = 5;
 
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    paws import scan hands.jsonl said.srt --out rec     a phone's scan, hands of a network, subtitles\n  \
+    paws import walk moge=DEPTH --rotate 90 --out rec   Project Aria, depth of MoGe-2\n  \
+    paws import work/sparse/0 IMAGES moge=DEPTH hands.jsonl said.srt --source-fps 10 --out rec\n\
+    What each device lacks and what fills it: README.md; step by step: docs/import.md.")]
 pub struct ImportArgs {
     /// Files and folders, the most important one first; each stream is taken from the first source that has it. The formats
     /// are told from the files; a format's name before them, or KIND=PATH, forces one
@@ -52,7 +57,7 @@ struct FrameArgs {
     /// Frames a second that are kept; 0 keeps all
     #[arg(long, value_name = "HZ", default_value_t = 10.0)]
     fps: f64,
-    /// Frames a second of a source that holds no times [default: 30]
+    /// Frames a second of images that hold no times; narrations and hands by time need it [default: 30]
     #[arg(long, value_name = "HZ")]
     source_fps: Option<f64>,
     /// Largest distance in time at which two streams are joined [default: half of the frames' period]

@@ -2,7 +2,7 @@
 
 use super::axes::Convention;
 use super::imported::{Frame, Imported};
-use super::report::{NEEDED, Report, SourceReport, source_name};
+use super::report::{NEEDED, Report, SourceReport, UNMET, source_name};
 use super::timeline::{self, Timeline};
 use super::view::View;
 use super::{Capture, Options, people, world};
@@ -142,7 +142,8 @@ fn told_changes(timeline: &Timeline, view: &View, options: &Options, report: &mu
     }
 }
 
-/// Streams that no source has, with the way to fill them: the source's own word where it has one.
+/// Streams that the result lacks, with the way to fill them: how what a source has can meet the frames, else the source's own
+/// word, else ours.
 fn missing(imported: &Imported) -> Vec<super::capture::Missing> {
     let lacks = |what: &str| match what {
         "images" => imported.frames.iter().all(|f| f.image.is_none()),
@@ -154,6 +155,15 @@ fn missing(imported: &Imported) -> Vec<super::capture::Missing> {
     };
     let mut out: Vec<super::capture::Missing> = Vec::new();
     for (what, why, command) in NEEDED.iter().filter(|(what, _, _)| lacks(what)) {
+        let unmet = imported.report.streams.iter().find(|s| s.stream == *what && s.count == 0 && s.of > 0);
+        if let Some(stream) = unmet {
+            out.push(super::capture::Missing {
+                what: (*what).to_owned(),
+                why: format!("none of the {} of {} meets a frame", stream.of, stream.source),
+                command: UNMET.to_owned(),
+            });
+            continue;
+        }
         let own = imported.captures.iter().flat_map(|c| &c.missing).find(|m| m.what == *what);
         out.push(own.cloned().unwrap_or_else(|| super::capture::Missing {
             what: (*what).to_owned(),

@@ -87,6 +87,17 @@ pub fn join<'a>(
     best
 }
 
+/// [`join`]; where nothing meets on clocks that nothing says are one, with the items' times counted from the first frame. Also
+/// what was added to their times, seconds.
+pub fn join_or_count(frames: &[At], items: &[At], is_one_clock: bool, gap_secs: f64) -> (Joined, f64) {
+    let joined = join(frames, items.iter(), is_one_clock, gap_secs);
+    let first = frames.iter().filter_map(|f| f.time_secs).min_by(f64::total_cmp);
+    let (By::Nothing, false, Some(first)) = (joined.by, is_one_clock, first) else { return (joined, 0.0) };
+    let counted: Vec<At> = items.iter().map(|i| i.later(first)).collect();
+    let counted = join(frames, counted.iter(), false, gap_secs);
+    if counted.by == By::Nothing { (joined, 0.0) } else { (counted, first) }
+}
+
 fn by_time<'a>(frames: &[At], items: impl Iterator<Item = &'a At>, by: By, gap_secs: f64) -> Joined {
     let mut times: Vec<(f64, usize)> =
         frames.iter().enumerate().filter_map(|(i, f)| f.time_secs.map(|t| (t, i))).collect();
@@ -208,6 +219,16 @@ mod tests {
         assert_eq!((joined.by, joined.frame_of), (By::Index, vec![Some(7)]));
         let none = join(&frames(), [At::default()].iter(), true, 0.05);
         assert_eq!(none.by, By::Nothing);
+    }
+
+    #[test]
+    fn times_that_meet_no_frame_count_from_the_first_one_unless_the_clock_is_known() {
+        let items = [At::time(0.0), At::time(0.31), At::time(7.0)];
+        let (joined, later) = join_or_count(&frames(), &items, false, 0.05);
+        assert_eq!((joined.by, later, joined.frame_of), (By::Overlap, 100.0, vec![Some(0), Some(3), None]));
+        assert_eq!(join_or_count(&frames(), &items, true, 0.05).0.by, By::Nothing);
+        let (joined, later) = join_or_count(&frames(), &[At::time(100.5)], false, 0.05);
+        assert_eq!((joined.frame_of, later), (vec![Some(5)], 0.0));
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::Options;
 use super::axes::{Convention, camera_matrix};
 use super::capture::{At, Capture, ClipAt, Hands, JointFrame};
 use super::imported::Hand;
-use super::join::{By, Track, join};
+use super::join::{By, Track, join, join_or_count};
 use super::names;
 use super::report::{Report, Stream, source_name};
 use super::timeline::{Draft, Timeline};
@@ -29,6 +29,8 @@ struct Bridge<'a> {
     place: &'a Place,
     pose_gap_secs: f64,
     is_one_clock: bool,
+    /// What was added to the hands' times so that they meet the frames, seconds.
+    later_secs: f64,
     focal_per_width: Option<f64>,
 }
 
@@ -55,7 +57,7 @@ impl Bridge<'_> {
         // Joints of another world go through the camera that both worlds know.
         let other = match &self.own_track {
             None => None,
-            Some(track) => Some(track.at(time_secs?, self.pose_gap_secs)?.inverse()),
+            Some(track) => Some(track.at(time_secs? - self.later_secs, self.pose_gap_secs)?.inverse()),
         };
         Some(joints.map(|p| {
             let p = Point::from(p?);
@@ -115,8 +117,12 @@ pub(super) fn hands(
     let ats: Vec<At> = source.items.iter().map(|h| h.at.later(options.hand_lag_secs)).collect();
     let frames: Vec<At> = timeline.frames.iter().map(|f| f.at.clone()).collect();
     let is_one_clock = timeline.is_one_clock(captures, index);
-    let joined = join(&frames, ats.iter(), is_one_clock, timeline.gap_secs);
-    let bridge = bridge(captures, index, source, timeline, place, options, report);
+    let (joined, later_secs) = join_or_count(&frames, &ats, is_one_clock, timeline.gap_secs);
+    let ats: Vec<At> = ats.iter().map(|at| at.later(later_secs)).collect();
+    if later_secs != 0.0 {
+        report.changes.push("hands' times are taken to count from the first frame".to_owned());
+    }
+    let bridge = Bridge { later_secs, ..bridge(captures, index, source, timeline, place, options, report) };
     let mut best: BTreeMap<(usize, Side), (f64, Hand)> = BTreeMap::new();
     let mut lost = 0;
     for ((item, at), frame) in source.items.iter().zip(&ats).zip(&joined.frame_of) {
@@ -187,6 +193,7 @@ fn bridge<'a>(
         place,
         pose_gap_secs: options.pose_gap_secs,
         is_one_clock: timeline.is_one_clock(captures, index) && timeline.is_one_clock(captures, timeline.posed),
+        later_secs: 0.0,
         focal_per_width: capture.hands_focal_per_width.filter(|f| f.is_finite() && *f > 0.0),
     }
 }

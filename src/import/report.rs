@@ -136,13 +136,18 @@ pub(super) const NEEDED: [(&str, &str, &str); 6] = [
     (
         "depth",
         "what moved is seen by depth",
-        "run a metric depth network on frames/ (MoGe-2: moge infer -i DIR/frames -o DEPTH --maps) and import its folder too",
+        "run a metric depth network on the source's own images (MoGe-2: moge infer -i IMAGES -o DEPTH --maps) and import its \
+         folder too",
     ),
-    ("hands", "the hand's path is the evidence", "run a hand tracker on frames/ and import its output too"),
+    (
+        "hands",
+        "the hand's path is the evidence",
+        "run a hand tracker on the source's own images or video and import its output too",
+    ),
     (
         "contact",
-        "hands.json does not say when a hand holds something",
-        "run a contact detector on frames/ and import its output too, or set hands.use_contact = false in --config",
+        "nobody says when a hand holds something: all samples of a clip count",
+        "run a contact detector on the source's own images and import its output too",
     ),
     (
         "clips",
@@ -151,3 +156,7 @@ pub(super) const NEEDED: [(&str, &str, &str); 6] = [
          {\"clips\": [{\"clip\", \"start_frame\", \"end_frame\", \"narration\"}]}",
     ),
 ];
+
+/// What to do about a stream that a source has and that meets no frame.
+pub(super) const UNMET: &str = "streams meet by time, by the image's name or by the frame's number: run networks on the source's \
+     own images, tell the rate of frames without times (--source-fps), move hands in time (--hand-lag)";

@@ -3,7 +3,7 @@
 use super::Options;
 use super::axes::Convention;
 use super::capture::{At, Capture, Picture};
-use super::join::{By, Track, half_period, join};
+use super::join::{By, Track, half_period, join, join_or_count};
 use super::optics::Optics;
 use super::report::{Report, Stream, source_name};
 use crate::error::{Error, Result};
@@ -183,7 +183,7 @@ fn with_hands(
     };
     let Some(i) = first(captures, |c| !hands(c).is_empty()) else { return out };
     let of = hands(&captures[i]);
-    for frame in join(ats, of.iter(), is_one_clock(i), gap_secs).frame_of.into_iter().flatten() {
+    for frame in join_or_count(ats, &of, is_one_clock(i), gap_secs).0.frame_of.into_iter().flatten() {
         if let Some(has) = out.get_mut(frame) {
             *has = true;
         }

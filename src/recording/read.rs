@@ -339,7 +339,9 @@ fn hands(dir: &Path, frames: usize, faults: &mut Faults) -> Result<Hands> {
     } else {
         return Err(Error::Io {
             path: full,
-            message: "no such file, and no fingertips.csv either; a recording needs one of them".to_owned(),
+            message: "no such file, and no fingertips.csv either; a recording needs one of them: run a hand tracker and import \
+                      its output too (paws import SOURCE HANDS --out DIR)"
+                .to_owned(),
         });
     };
     let name = if full.is_file() { "hands.json" } else { "fingertips.csv" };

@@ -459,6 +459,34 @@ fn hands_of_which_nobody_says_whether_they_hold_are_told_as_such() {
     assert!(!hands.contains("\"contact\""));
 }
 
+/// The recording and its hands as two sources; what is added to the hands' times, seconds.
+fn apart_by(later_secs: f64) -> Vec<Capture> {
+    let mut first = capture(&small(), JointOrder::Mano);
+    let mut hands = first.hands.take();
+    for hand in hands.iter_mut().flat_map(|h| &mut h.items) {
+        hand.at = hand.at.later(later_secs);
+    }
+    let second = Capture { kind: "hands".to_owned(), source: PathBuf::from("hands"), hands, ..Capture::default() };
+    vec![first, second]
+}
+
+#[test]
+fn hands_whose_times_count_from_the_video_are_those_of_frames_on_another_clock() {
+    let options = Options { fps: 0.0, ..Options::default() };
+    let imported = assemble(apart_by(-secs(0)), &options).unwrap();
+    let row = imported.report.streams.iter().find(|s| s.stream == "hands").unwrap();
+    assert_eq!((row.count, row.of), (small().hands.len(), small().hands.len()), "{row:?}");
+    let told = &imported.report.changes;
+    assert!(told.iter().any(|c| c == "hands' times are taken to count from the first frame"), "{told:?}");
+}
+
+#[test]
+fn hands_that_meet_no_frame_are_told_as_such_and_not_as_absent() {
+    let imported = assemble(apart_by(9000.0), &Options::default()).unwrap();
+    let missing = imported.report.missing.iter().find(|m| m.what == "hands").unwrap();
+    assert!(missing.why.contains("meets a frame") && missing.command.contains("--hand-lag"), "{missing:?}");
+}
+
 /// Breaks a source and expects `paws import` to name all of `words`, and to leave nothing behind.
 pub(crate) fn refused(name: &str, words: &[&str], break_it: impl Fn(&Path)) {
     let dir = tempfile::tempdir().unwrap();

@@ -68,7 +68,7 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         missing: vec![Missing {
             what: "depth".to_owned(),
             why: "the headset's depth is not in the data set".to_owned(),
-            command: "run a metric depth network on the frames and import its output too".to_owned(),
+            command: "run a metric depth network (MoGe-2) on the video's pictures and import its folder too".to_owned(),
         }],
         ..Capture::default()
     })

@@ -55,7 +55,7 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
     let mut lacks = vec![missing(
         "hands",
         "the app records no hands",
-        "run a hand tracker on DIR/frames and import its output too",
+        "run a hand tracker on DIR/frames and import its hands as JSON lines too, with the timestamps of DIR/cameras.json as time",
     )];
     if seen.images.is_empty() {
         lacks.push(missing(

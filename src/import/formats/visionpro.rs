@@ -96,7 +96,7 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
     missing.push(Missing {
         what: "depth".to_owned(),
         why: "the headset gives no depth to apps".to_owned(),
-        command: "run a metric depth network on DIR/frames (MoGe-2) and import its folder too".to_owned(),
+        command: "run a metric depth network (MoGe-2) on the video's pictures and import its folder too".to_owned(),
     });
     Ok(Capture {
         kind: "visionpro".to_owned(),
