@@ -96,13 +96,15 @@ pub(crate) fn parse<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T> {
         Err(error) => error,
     };
     // JSON, but not what is wanted: the value tells better than the parser what stands where.
-    if error.classify() == Category::Data
-        && let Ok(value) = serde_json::from_str(text)
-        && let Some((place, message)) = typed::explain::<T>(&value)
-    {
-        return Err(Error::format(path, place, message));
+    match serde_json::from_str::<serde_json::Value>(text) {
+        Ok(value) => match typed::explain::<T>(&value) {
+            Some((place, message)) => Err(Error::format(path, place, message)),
+            None => Err(no_json(text, path, &error)),
+        },
+        // What is no JSON further on is worse than what is not wanted.
+        Err(worse) if error.classify() == Category::Data => Err(no_json(text, path, &worse)),
+        Err(_) => Err(no_json(text, path, &error)),
     }
-    Err(no_json(text, path, &error))
 }
 
 /// What is wrong with text that is no JSON.
@@ -116,7 +118,11 @@ fn no_json(text: &str, path: &Path, error: &serde_json::Error) -> Error {
     // The parser says the place too, behind its message.
     let said = error.to_string();
     let said = said.split(" at line ").next().unwrap_or(&said);
-    let hint = hint(text, offset, &place);
+    let hint = match hint(text, offset, &place) {
+        "" if said.starts_with("EOF") => "; the file is cut off",
+        "" if said == "trailing characters" => "; one value a file is wanted, more follows",
+        hint => hint,
+    };
     Error::format(path, format!("line {}, column {}{place}", error.line(), error.column()), format!("{said}{hint}"))
 }
 
@@ -177,7 +183,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.json");
         let utf16: Vec<u8> = "\u{feff}{}".encode_utf16().flat_map(u16::to_le_bytes).collect();
-        let cases: [(&[u8], &str); 11] = [
+        let cases: [(&[u8], &str); 13] = [
             (b"\x1f\x8b\x08\x00", "gzip"),
             (&utf16, "UTF-16"),
             (b"{\x00}\x00", "UTF-16"),
@@ -188,6 +194,8 @@ mod tests {
             (b"{\"a\": [1, NaN]}", "line 1, column 11, a[1]: expected value; NaN"),
             (b"{\"a\": True}", "true, false"),
             (b"", "empty"),
+            (b"{\"a\": [1, 2", "the file is cut off"),
+            (b"{\"a\": 1}\n{\"a\": 2}\n", "line 2, column 1: trailing characters; one value a file"),
             (b"{\"a\": \"\xff\"}", "byte 7: is not UTF-8"),
         ];
         for (bytes, words) in cases {

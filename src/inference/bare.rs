@@ -62,6 +62,13 @@ pub fn infer(trajectory: &BareTrajectory, config: &config::Inference) -> Outcome
     let (hinge, contradicted) = hinge(&points, turn.as_ref().filter(|t| t.angle >= MIN_TURN_RAD).map(|t| t.axis));
     let slide_residual = path::across(&points, &slide.axis).map_or(f64::INFINITY, f64::sqrt);
     let hinge_fit = hinge.and_then(|j| path::about_line(&points, &j.line()).map(|f| (j, f)));
+    let has_turned = turn.as_ref().is_some_and(|t| t.angle >= MIN_TURN_RAD);
+    if !has_turned && !bend::stands_out(&points, hinge_fit.map(|(_, f)| f.variance())) {
+        return Outcome::Abstained(format!(
+            "the points wander over {:.0} mm, hardly farther one way than another: nothing moved",
+            2000.0 * extent
+        ));
+    }
     let nats = bend::hinge_over_slide(&points, hinge.as_ref(), config.max_radius_m).unwrap_or(0.0);
     let radius = hinge_fit.map(|(_, f)| f.radius);
 
@@ -264,6 +271,23 @@ mod tests {
         let still = shaken(&[Point::new(1.0, 2.0, 3.0); 120], 0.01);
         let found = infer(&bare(still), &config::Inference::default());
         assert!(found.reason().unwrap().contains("nothing moved"), "{found:?}");
+    }
+
+    #[test]
+    fn a_still_hand_that_drifts_moved_nothing_and_a_part_that_goes_round_did() {
+        // Errors that last for ten samples.
+        let mut seed = 3;
+        let mut at = Vector::zeros();
+        let still: Vec<Point> = (0..300)
+            .map(|_| {
+                at = 0.9 * at + 0.44 * 0.01 * Vector::new(noise(&mut seed), noise(&mut seed), noise(&mut seed));
+                Point::new(1.0, 2.0, 3.0) + at
+            })
+            .collect();
+        let found = infer(&bare(still), &config::Inference::default());
+        assert!(found.reason().is_some_and(|r| r.contains("nothing moved")), "{found:?}");
+        let found = infer(&bare(shaken(&arc(120, 330.0), 0.005)), &config::Inference::default());
+        assert!(found.found().is_some_and(|j| j.joint.kind == JointKind::Revolute), "{found:?}");
     }
 
     #[test]

@@ -111,6 +111,17 @@ pub(super) fn progresses(points: &[Point]) -> bool {
     stats::mean(&steps).is_some_and(|step| step < variance)
 }
 
+/// Whether a path goes somewhere rather than about: three times as far along a line as beside it, as variances go, or, where it
+/// is round, ten times as far as beside its circle (`round_m2`, square metres), which fits any cloud better than a line does. A
+/// still hand that drifts as its camera does stays below both.
+pub(super) fn stands_out(points: &[Point], round_m2: Option<f64>) -> bool {
+    const LINE: f64 = 3.0;
+    const CIRCLE: f64 = 10.0;
+    let Some(path) = Straightened::of(points) else { return false };
+    let along = path.along.iter().map(|u| u * u).sum::<f64>() / path.along.len() as f64;
+    along > LINE * mean_square(&path.beside) || round_m2.is_some_and(|beside| along > CIRCLE * beside)
+}
+
 /// The opening that a path goes through, rad or m. `beside_m` is what lies beside the joint's path (root mean square).
 ///
 /// All of the path counts. Of a hundred samples one is given up at an end where it stands apart from the others, or where the

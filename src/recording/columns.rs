@@ -85,19 +85,21 @@ impl Layout {
     /// The columns of a header; `Err` says which name is not understood or missing.
     pub(super) fn by_names(names: &[&str]) -> Result<Self, String> {
         let mut time = None;
-        let mut index = false;
         let mut position: [Option<usize>; 3] = [None; 3];
         let mut orientation: [Option<usize>; 4] = [None; 4];
         let mut units = Vec::new();
         for (i, name) in names.iter().enumerate() {
-            let Some(column) = column(name) else {
+            // A nameless first column numbers the rows of a data frame.
+            let found = if i == 0 && is_nameless(name) { Some(Column::Index) } else { column(name) };
+            let Some(column) = found else {
+                let shown = if name.is_empty() { format!("{} (without a name)", i + 1) } else { (*name).to_owned() };
                 return Err(format!(
-                    "column {name} is not understood; keep time, x, y, z, qx, qy, qz, qw (in any order) and leave out the rest"
+                    "column {shown} is not understood; keep time, x, y, z, qx, qy, qz, qw (in any order) and leave out the rest"
                 ));
             };
             let twice = match column {
                 Column::Time(seconds) => time.replace((i, seconds)).is_some(),
-                Column::Index => std::mem::replace(&mut index, true),
+                Column::Index => false,
                 Column::Position(k, unit) => {
                     units.push(unit);
                     position.get_mut(k).is_some_and(|slot| slot.replace(i).is_some())
@@ -129,17 +131,45 @@ pub(super) fn understood(names: &[&str]) -> usize {
     names.iter().filter(|n| column(n).is_some()).count()
 }
 
+/// Whether these are the units of columns rather than their names: `s`, `[mm]`, nothing or `[]` for what has none.
+pub(super) fn are_units(names: &[&str]) -> bool {
+    let bare = |name: &str| name.trim_matches(|c: char| !c.is_ascii_alphanumeric()).to_ascii_lowercase();
+    let units: Vec<String> = names.iter().map(|n| bare(n)).collect();
+    let is_unit = |u: &String| u.is_empty() || length(u).is_some() || seconds(u).is_some();
+    units.iter().any(|u| !u.is_empty()) && units.iter().all(is_unit)
+}
+
+fn is_nameless(name: &str) -> bool {
+    name.is_empty() || name.to_ascii_lowercase().starts_with("unnamed")
+}
+
+/// `posX` as `pos_x`: a capital behind a small letter begins a word.
+fn with_words_apart(name: &str) -> String {
+    let mut apart = String::with_capacity(name.len() + 4);
+    let mut after_small = false;
+    for c in name.chars() {
+        if after_small && c.is_ascii_uppercase() {
+            apart.push('_');
+        }
+        after_small = c.is_ascii_lowercase();
+        apart.push(c.to_ascii_lowercase());
+    }
+    apart
+}
+
 /// What a column of this name holds: `x`, `tx`, `pos_x`, `p_RS_R_x [m]`, `pose.position.x`, `x (mm)`, `q_w`, `timestamp [ns]`.
 fn column(name: &str) -> Option<Column> {
-    let name = name.to_ascii_lowercase();
+    let name = with_words_apart(name);
     let mut words: Vec<&str> = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty()).collect();
     // A unit stands behind the name.
     let unit = words.last().copied().filter(|w| words.len() > 1 && (length(w).is_some() || seconds(w).is_some()));
     if unit.is_some() {
         words.pop();
     }
-    const COUNTERS: [&str; 9] = ["frame", "frames", "index", "idx", "seq", "number", "row", "line", "no"];
-    if !words.is_empty() && words.iter().all(|w| COUNTERS.contains(w)) {
+    const COUNTERS: [&str; 11] =
+        ["frame", "frames", "index", "idx", "seq", "number", "row", "line", "no", "sample", "step"];
+    // An id alone may be that of a hand or marker.
+    if words.iter().any(|w| COUNTERS.contains(w)) && words.iter().all(|w| *w == "id" || COUNTERS.contains(w)) {
         return Some(Column::Index);
     }
     const TIMES: [&str; 9] = ["t", "time", "times", "timestamp", "timestamps", "stamp", "sec", "secs", "seconds"];
@@ -234,10 +264,24 @@ mod tests {
         assert_eq!((layout.time, layout.unit), (Some((3, 1e-3)), Some(LengthUnit::Millimetre)));
         let layout = Layout::by_names(&["frame", "Pose.Position.X", "pose.position.y", "pose.position.z"]).unwrap();
         assert_eq!((layout.time, layout.position), (None, [1, 2, 3]));
+        let layout = Layout::by_names(&["", "frameId", "timeStamp", "posX", "posY", "posZ"]).unwrap();
+        assert_eq!((layout.time, layout.position), (Some((2, 1.0)), [3, 4, 5]));
         assert_eq!(
             Layout::by_names(&["timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"]).ok(),
             Layout::by_count(8)
         );
+    }
+
+    #[test]
+    fn units_are_told_from_names() {
+        for (names, units) in [
+            (&["s", "m", "m", "m"][..], true),
+            (&["[s]", "(mm)", "(mm)", "(mm)", "[]"][..], true),
+            (&["t", "x", "y", "z"][..], false),
+            (&["", "", ""][..], false),
+        ] {
+            assert_eq!(are_units(names), units, "{names:?}");
+        }
     }
 
     #[test]
@@ -250,7 +294,8 @@ mod tests {
             (&["x", "y", "z", "roll", "pitch", "yaw"][..], "column roll"),
             (&["x", "x", "y", "z"][..], "is there twice"),
             (&["x_mm", "y_mm", "z_cm"][..], "different units"),
-            (&["", "x", "y", "z"][..], "column  is not understood"),
+            (&["x", "y", "z", ""][..], "column 4 (without a name) is not understood"),
+            (&["id", "x", "y", "z"][..], "column id is not understood"),
         ] {
             let error = Layout::by_names(names).unwrap_err();
             assert!(error.contains(word), "{error}");

@@ -391,8 +391,8 @@ pub(super) fn bounded_line(reader: &mut impl BufRead, path: &Path, number: usize
     if read as u64 > MAX_LINE_BYTES {
         return Err(Error::format(path, format!("line {number}"), "is longer than 64 KiB; is this a text table?"));
     }
-    let text =
-        String::from_utf8(bytes).map_err(|_| Error::format(path, format!("line {number}"), "is not UTF-8 text"))?;
+    let text = String::from_utf8(bytes)
+        .map_err(|_| Error::format(path, format!("line {number}"), "is not UTF-8 text; save it as UTF-8"))?;
     Ok(Some(text.trim_end_matches(['\n', '\r']).to_owned()))
 }
 

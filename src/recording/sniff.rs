@@ -20,7 +20,7 @@ pub(super) fn no_table(start: &[u8]) -> Option<String> {
         return Some(format!("{what}; {way}"));
     }
     if start.contains(&0) {
-        return Some("holds zero bytes: it is no text; write the positions as lines of x y z".to_owned());
+        return Some("holds zero bytes: it is no UTF-8 text; write the positions as lines of x y z".to_owned());
     }
     let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start).trim_ascii_start();
     let next = |sign: u8| text.strip_prefix(&[sign]).map(|rest| rest.trim_ascii_start().first().copied());
@@ -34,23 +34,72 @@ pub(super) fn no_table(start: &[u8]) -> Option<String> {
         .then(|| "has carriage returns and no line ends; save it with the line ends of Unix or Windows".to_owned())
 }
 
-/// What is odd about a line of a table that is not all numbers, with the way out; empty where nothing is known.
-pub(super) fn hint(line: &str, cells: &[&str]) -> &'static str {
-    if line.starts_with(['[', '(']) {
+/// Whether a line that is not all numbers stands above them as a title or a header: it is words, with few numbers among them.
+pub(super) fn is_title(line: &str) -> bool {
+    let in_word = |c: char| c.is_alphanumeric() || matches!(c, '.' | '-' | '+' | '_');
+    let (mut all, mut numbers) = (0, 0);
+    for word in line.split(|c: char| !in_word(c)).filter(|w| !w.is_empty()) {
+        all += 1;
+        numbers += usize::from(word.parse::<f64>().is_ok());
+    }
+    // A row has three numbers; the settings of a program may have as many among many words.
+    2 * numbers <= all && (numbers < 3 || 4 * numbers < all)
+}
+
+/// Whether a row says in words that nothing was seen: `NA`, `null`, `-`, alone or beside numbers.
+pub(super) fn not_seen(cells: &[&str]) -> bool {
+    const WORDS: [&str; 10] = ["na", "n/a", "nan", "null", "nil", "none", "lost", "missing", "-", "--"];
+    let is_word = |cell: &str| WORDS.iter().any(|w| cell.eq_ignore_ascii_case(w));
+    cells.len() >= 3
+        && cells.iter().any(|c| is_word(c))
+        && cells.iter().all(|c| is_word(c) || c.is_empty() || c.parse::<f64>().is_ok())
+}
+
+/// What is odd about a line of a table that is not all numbers, with the way out.
+pub(super) fn hint(line: &str, cells: &[&str]) -> String {
+    let is_clock = |c: &&str| {
+        let digit = |side: Option<char>| side.is_some_and(|c| c.is_ascii_digit());
+        c.split_once(':').is_some_and(|(a, b)| digit(a.chars().next_back()) && digit(b.chars().next()))
+    };
+    let begins_with_number =
+        |rest: &str| rest.trim_start().starts_with(|c: char| c.is_ascii_digit() || matches!(c, '-' | '+' | '.'));
+    let known = if line.starts_with('{') {
+        "; is it JSON? write the numbers alone, with a header for their names"
+    } else if line.split(['[', '(']).skip(1).any(begins_with_number) {
         "; leave the brackets out"
-    } else if cells.iter().any(|c| c.contains(':')) {
+    } else if line.contains('|') {
+        "; separate columns by commas or spaces"
+    } else if cells.iter().any(is_clock) {
         "; time stamps must be seconds"
     } else if cells.iter().any(|c| c.starts_with("0x") || c.starts_with("-0x")) {
         "; write numbers as decimals"
     } else {
         ""
+    };
+    let odd = cells.iter().find(|c| c.parse::<f64>().is_err()).filter(|_| known.is_empty() && cells.len() > 1);
+    odd.map_or_else(
+        || known.to_owned(),
+        |word| format!("; \"{}\" is no number", word.chars().take(20).collect::<String>()),
+    )
+}
+
+/// A way out for a row whose decimal commas were taken for separators: twice the columns of a position, whole numbers all.
+pub(super) fn split_decimals(line: &str, cells: &[&str]) -> &'static str {
+    let whole = |c: &&str| {
+        let digits = c.trim_start_matches(['-', '+']);
+        !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit())
+    };
+    if line.contains(',') && cells.len() >= 6 && cells.len().is_multiple_of(2) && cells.iter().all(whole) {
+        "; are these decimal commas? write decimal points"
+    } else {
+        ""
     }
 }
 
-/// Whether a line writes its numbers with decimal commas: `0,25;0,5;-0,1`, or the same with white space between.
+/// Whether a line writes its numbers with decimal commas: `0,25;0,5;-0,1`, or the same with white space between, or in quotes.
 pub(super) fn decimal_commas(line: &str) -> bool {
-    let cells: Vec<&str> = if line.contains(';') {
-        line.split(';').map(str::trim).filter(|c| !c.is_empty()).collect()
+    let cells: Vec<&str> = if line.contains([';', '"']) {
+        super::trajectory::cells(line).into_iter().filter(|c| !c.is_empty()).collect()
     } else {
         line.split_whitespace().collect()
     };
@@ -91,8 +140,26 @@ mod tests {
     }
 
     #[test]
+    fn titles_are_told_from_rows() {
+        for line in
+            ["t,x,y,z", "OptiTrack export 3.0", "Marker 12", "recorded 2025-01-02 12:30", "Rate,120.0,Units,Meters"]
+        {
+            assert!(is_title(line), "{line}");
+        }
+        for line in ["0.1|0.2|0.3", "hand 0.1 0.2 0.3", "x: 1 y: 2 z: 3", "[0.1, 0.2, 0.3]", "1 2 three", "0x1p0 0 0"] {
+            assert!(!is_title(line), "{line}");
+        }
+    }
+
+    #[test]
     fn decimal_commas_are_told_from_separators() {
-        for line in ["0,5;1,25;-3,0", "0;0,25;-0,1;0,5", "0,250000 -0,030000 0,500000"] {
+        for line in [
+            "0,5;1,25;-3,0",
+            "0;0,25;-0,1;0,5",
+            "0,250000 -0,030000 0,500000",
+            "\"0,5\",\"1,25\",\"-3,0\"",
+            "\"0,5\";\"1,25\";\"-3,0\"",
+        ] {
             assert!(decimal_commas(line), "{line}");
         }
         for line in ["0.5;1.25;3.0", "1, 2, 3", "1,2,3", "0.1,0.2,0.3", "1 2 3", "t;x;y;z", "1;2;3"] {

@@ -1,5 +1,6 @@
 //! A bare trajectory: white-space or CSV, positions with or without orientations and time stamps.
 
+use std::collections::HashMap;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -60,16 +61,34 @@ pub fn read_in(path: &Path, unit: Option<LengthUnit>) -> Result<BareTrajectory> 
     table.finish(unit)
 }
 
-/// The cells of a line: of CSV those between the separators, also empty ones, of anything else its words.
-fn cells(line: &str) -> Vec<&str> {
-    let separator = if line.contains(';') { Some(';') } else { line.contains(',').then_some(',') };
-    let Some(separator) = separator else { return line.split_whitespace().collect() };
-    let mut cells: Vec<&str> = line.split(separator).map(|c| c.trim().trim_matches('"').trim()).collect();
-    // A separator at the end of a line opens no cell.
-    if cells.last().is_some_and(|c| c.is_empty()) {
+/// The cells of a line: of CSV those between the separators, also empty ones, of tables with tabs those that hold something, of
+/// anything else its words. A separator within quotes separates nothing.
+pub(super) fn cells(line: &str) -> Vec<&str> {
+    let separator = [';', ',', '\t'].into_iter().find(|s| line.contains(*s) && outside_quotes(line, *s).len() > 1);
+    let Some(separator) = separator else { return line.split_whitespace().map(bare).collect() };
+    let mut cells: Vec<&str> = outside_quotes(line, separator).into_iter().map(bare).collect();
+    if separator == '\t' {
+        // Several tabs align columns.
+        cells.retain(|c| !c.is_empty());
+    } else if cells.last().is_some_and(|c| c.is_empty()) {
+        // A separator at the end of a line opens no cell.
         cells.pop();
     }
     cells
+}
+
+/// What lies between the separators that stand outside of quotes.
+fn outside_quotes(line: &str, separator: char) -> Vec<&str> {
+    let mut quoted = false;
+    line.split(|c: char| {
+        quoted ^= c == '"';
+        !quoted && c == separator
+    })
+    .collect()
+}
+
+fn bare(cell: &str) -> &str {
+    cell.trim().trim_matches('"').trim()
 }
 
 /// The numbers of a line: one or more in each cell; `None` where a word is none.
@@ -119,29 +138,49 @@ impl<'a> Table<'a> {
         }
         let cells = cells(text);
         if let Some(values) = numbers(&cells) {
-            return self.row(number, &cells, &values);
+            return self.row(number, text, &values);
         }
-        // A title or a header stands above the numbers and has none in it.
-        let is_title = cells.iter().all(|c| c.parse::<f64>().is_err());
-        let titles = self.titles.iter().filter(|(.., is_comment)| !is_comment).count();
-        if is_title && self.layout.is_none() && titles < MAX_TITLES {
+        if sniff::not_seen(&cells) {
+            return Err(self.fault(number, "a value is missing; leave the line out where the hand was not seen"));
+        }
+        // A title or a header stands above the numbers.
+        let is_title = sniff::is_title(text);
+        if is_title && self.layout.is_none() {
+            if self.titles.iter().filter(|(.., is_comment)| !is_comment).count() >= MAX_TITLES {
+                return Err(self.no_numbers());
+            }
             self.titles.push((number, text.to_owned(), false));
             return Ok(());
         }
-        let start: String = text.chars().take(40).collect();
-        let again = if is_title && columns::understood(&cells) >= 3 {
-            "; a second header: one file holds one motion"
-        } else {
-            sniff::hint(text, &cells)
-        };
-        Err(self.fault(number, format!("\"{start}\" is not all numbers; {EXPECTED}{again}")))
+        if is_title && columns::understood(&cells) >= 3 {
+            return Err(self.not_all_numbers(number, text, "; a second header: one file holds one motion"));
+        }
+        Err(self.not_all_numbers(number, text, &sniff::hint(text, &cells)))
     }
 
-    /// The columns: what the nearest header above says, else by their number.
-    fn columns(&self, number: usize, count: usize) -> Result<Layout> {
+    fn not_all_numbers(&self, number: usize, text: &str, hint: &str) -> Error {
+        let start: String = text.chars().take(40).collect();
+        self.fault(number, format!("\"{start}\" is not all numbers; {EXPECTED}{hint}"))
+    }
+
+    /// The fault of a file in which no line has numbers: its first line shows what it is.
+    fn no_numbers(&self) -> Error {
+        match self.titles.iter().find(|(.., is_comment)| !is_comment) {
+            Some((number, text, _)) => self.not_all_numbers(*number, text, &sniff::hint(text, &cells(text))),
+            None => Error::format(self.path, "end of file", "no positions; expected lines of x y z"),
+        }
+    }
+
+    /// The columns of a row: what the nearest header above says, with the units of a line below it, else by their number.
+    fn columns(&self, number: usize, row: &str, count: usize) -> Result<Layout> {
         let by_count = Layout::by_count(count);
+        let mut units: Option<(usize, Vec<&str>)> = None;
         for (at, text, is_comment) in self.titles.iter().rev() {
             let names = cells(text);
+            if units.is_none() && names.len() == count && columns::are_units(&names) {
+                units = Some((*at, names));
+                continue;
+            }
             let understood = columns::understood(&names);
             let names_all = names.len() == count;
             let is_header = if *is_comment {
@@ -154,27 +193,45 @@ impl<'a> Table<'a> {
                 continue;
             }
             if !names_all {
-                let message = format!("the header in line {at} names {} columns, the row has {count}", names.len());
+                let hint = sniff::split_decimals(row, &cells(row));
+                let message =
+                    format!("the header in line {at} names {} columns, the row has {count}{hint}", names.len());
                 return Err(self.fault(number, message));
             }
-            return Layout::by_names(&names).map_err(|e| self.fault(*at, e));
+            let layout = match &units {
+                None => Layout::by_names(&names),
+                Some((_, units)) => {
+                    let with: Vec<String> =
+                        names.iter().zip(units).map(|(name, unit)| format!("{name} {unit}")).collect();
+                    Layout::by_names(&with.iter().map(String::as_str).collect::<Vec<_>>())
+                }
+            };
+            return layout.map_err(|e| self.fault(*at, e));
+        }
+        if let Some((at, _)) = units {
+            return Err(self.fault(at, "has units, and no line above it names the columns"));
         }
         by_count.ok_or_else(|| {
-            let hint = match count {
-                12 => "; of a 3 by 4 matrix a line the 4th, 8th and 12th number are x y z",
-                _ => "; a header may name other columns",
+            let hint = match (count, sniff::split_decimals(row, &cells(row))) {
+                (12 | 16, _) => "; of a matrix a line the 4th, 8th and 12th number are x y z",
+                (13 | 17, _) => {
+                    "; of a matrix a line, with one number before it, the 5th, 9th and 13th number are x y z"
+                }
+                (_, "") => "; a header may name other columns",
+                (_, decimals) => decimals,
             };
             self.fault(number, format!("{count} columns; {EXPECTED}{hint}"))
         })
     }
 
-    fn row(&mut self, number: usize, cells: &[&str], values: &[f64]) -> Result<()> {
+    fn row(&mut self, number: usize, row: &str, values: &[f64]) -> Result<()> {
+        let cells = cells(row);
         if cells.iter().any(|c| c.is_empty()) {
             return Err(self.fault(number, "a cell is empty; leave the line out where the hand was not seen"));
         }
         let layout = match self.layout {
             Some(layout) => layout,
-            None => self.columns(number, values.len())?,
+            None => self.columns(number, row, values.len())?,
         };
         self.layout = Some(layout);
         if values.len() != layout.count {
@@ -200,8 +257,9 @@ impl<'a> Table<'a> {
             if (q.norm() - 1.0).abs() > 1e-2 {
                 let message = format!(
                     "the quaternion (x y z w) has norm {:.4}, expected 1; name the columns in a header where their order is \
-                     another, leave the line out where nothing was seen",
-                    q.norm()
+                     another, leave the line out where nothing was seen{}",
+                    q.norm(),
+                    sniff::split_decimals(row, &cells)
                 );
                 return Err(self.fault(number, message));
             }
@@ -212,12 +270,7 @@ impl<'a> Table<'a> {
 
     fn finish(mut self, unit: Option<LengthUnit>) -> Result<BareTrajectory> {
         if self.out.positions.is_empty() {
-            if let Some((number, text, _)) = self.titles.iter().find(|(.., is_comment)| !is_comment) {
-                let start: String = text.chars().take(40).collect();
-                let hint = sniff::hint(text, &cells(text));
-                return Err(self.fault(*number, format!("\"{start}\" is not all numbers; {EXPECTED}{hint}")));
-            }
-            return Err(Error::format(self.path, "end of file", "no positions; expected lines of x y z"));
+            return Err(self.no_numbers());
         }
         let named = self.layout.and_then(|l| l.unit);
         if let (Some(named), Some(unit)) = (named, unit)
@@ -239,17 +292,21 @@ impl<'a> Table<'a> {
     }
 }
 
-/// Leaves out rows by which trackers say that they saw nothing: one and the same number thrice, far from where the hand was
-/// seen before and after.
+/// Leaves out rows by which trackers say that they saw nothing, far from where the hand was seen before and after.
 fn leave_out_lost(out: &mut BareTrajectory) {
-    let is_sign = |p: &Point| p.x == p.y && p.y == p.z;
+    let signs = signs(&out.positions);
     // Rows that could be such a sign do not tell how far the hand goes from row to row.
-    let steps: Vec<f64> =
-        out.positions.windows(2).filter(|w| !is_sign(&w[0]) && !is_sign(&w[1])).map(|w| (w[1] - w[0]).norm()).collect();
+    let steps: Vec<f64> = out
+        .positions
+        .windows(2)
+        .zip(signs.windows(2))
+        .filter(|(_, s)| !s[0] && !s[1])
+        .map(|(w, _)| (w[1] - w[0]).norm())
+        .collect();
     let Some(usual) = stats::quantile(&steps, 0.95).filter(|s| *s > 0.0) else { return };
     // No hand speeds up like this from one row to the next.
     let far = 10.0 * usual;
-    let seen: Vec<Option<Point>> = out.positions.iter().map(|p| (!is_sign(p)).then_some(*p)).collect();
+    let seen: Vec<Option<Point>> = out.positions.iter().zip(&signs).map(|(p, s)| (!s).then_some(*p)).collect();
     let mut before = Vec::with_capacity(seen.len());
     let mut last = None;
     for p in &seen {
@@ -265,18 +322,51 @@ fn leave_out_lost(out: &mut BareTrajectory) {
         lost[i] = p.is_none() && is_far(before[i]) && is_far(next);
     }
     let count = lost.iter().filter(|l| **l).count();
-    if count == 0 || 2 * count > lost.len() {
+    let mut values: Vec<Point> = out.positions.iter().zip(&lost).filter(|(_, l)| **l).map(|(p, _)| *p).collect();
+    values.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z)));
+    values.dedup();
+    // One value may stand in most rows; many of them are no sign.
+    if count == 0 || (2 * count > lost.len() && values.len() > 1) {
         return;
     }
-    let mut signs: Vec<f64> = out.positions.iter().zip(&lost).filter(|(_, l)| **l).map(|(p, _)| p.x).collect();
-    signs.sort_by(f64::total_cmp);
-    signs.dedup();
-    let shown: Vec<String> = signs.iter().take(3).map(|s| format!("{s} {s} {s}")).collect();
+    let shown: Vec<String> = values.iter().take(3).map(|p| format!("{} {} {}", p.x, p.y, p.z)).collect();
     out.notes.push(format!("{count} rows of {} are left out: nothing was seen there", shown.join(", ")));
     let keep = |i: usize| !lost.get(i).copied().unwrap_or(false);
     out.positions = kept(&out.positions, &keep);
     out.times_secs = kept(&out.times_secs, &keep);
     out.orientations = kept(&out.orientations, &keep);
+}
+
+/// Rows that could say that nothing was seen: one and the same number thrice, or one and the same point in several rows, to which
+/// the positions jump and from which they come back to where they were.
+fn signs(points: &[Point]) -> Vec<bool> {
+    let mut signs: Vec<bool> = points.iter().map(|p| p.x == p.y && p.y == p.z).collect();
+    let steps: Vec<f64> = points.windows(2).map(|w| (w[1] - w[0]).norm()).filter(|s| *s > 0.0).collect();
+    let jump = 10.0 * stats::median(&steps).unwrap_or(0.0);
+    let key = |p: &Point| [p.x, p.y, p.z].map(f64::to_bits);
+    let mut rows: HashMap<[u64; 3], usize> = HashMap::new();
+    let mut away = Vec::new();
+    let mut from = 0;
+    for run in points.chunk_by(|a, b| a == b) {
+        let to = from + run.len();
+        if from > 0
+            && let (Some(before), Some(here), Some(after)) = (points.get(from - 1), run.first(), points.get(to))
+        {
+            let least = (here - before).norm().min((here - after).norm());
+            if least > jump && least > 2.0 * (after - before).norm() {
+                *rows.entry(key(here)).or_default() += run.len();
+                away.push(from..to);
+            }
+        }
+        from = to;
+    }
+    for range in away {
+        let is_repeated = points.get(range.start).and_then(|p| rows.get(&key(p))).is_some_and(|n| *n > 1);
+        for sign in signs.get_mut(range).into_iter().flatten() {
+            *sign |= is_repeated;
+        }
+    }
+    signs
 }
 
 fn kept<T: Copy>(all: &[T], keep: &dyn Fn(usize) -> bool) -> Vec<T> {
@@ -287,6 +377,8 @@ fn kept<T: Copy>(all: &[T], keep: &dyn Fn(usize) -> bool) -> Vec<T> {
 fn other_unit(positions: &[Point], unit: LengthUnit) -> Option<String> {
     // A person opens a part within reach and a few steps; the middle nine tenths are not misled by single jumps.
     const MOST_M: f64 = 5.0;
+    // What moves less is not told from noise.
+    const LEAST_M: f64 = 0.02;
     // What a handle travels, in the order of magnitude.
     const USUAL_M: f64 = 0.5;
     let side = |k: usize| {
@@ -297,15 +389,19 @@ fn other_unit(positions: &[Point], unit: LengthUnit) -> Option<String> {
     if size <= MOST_M {
         return None;
     }
-    let off = |u: &LengthUnit| (size / unit.metres() * u.metres() / USUAL_M).ln().abs();
-    let likely = [LengthUnit::Metre, LengthUnit::Centimetre, LengthUnit::Millimetre]
+    let sized = |u: LengthUnit| size / unit.metres() * u.metres();
+    let mut others: Vec<LengthUnit> = [LengthUnit::Metre, LengthUnit::Centimetre, LengthUnit::Millimetre]
         .into_iter()
-        .filter(|u| *u != unit)
-        .min_by(|a, b| off(a).total_cmp(&off(b)))
-        .filter(|u| size / unit.metres() * u.metres() <= MOST_M);
-    let way = match likely {
-        Some(u) => format!("in {0} it would be {1:.2} m: say --units {0}", u.sign(), size / unit.metres() * u.metres()),
-        None => "it is no motion of one part in m, cm or mm; cut it, or mend its columns".to_owned(),
+        .filter(|u| *u != unit && (LEAST_M..=MOST_M).contains(&sized(*u)))
+        .collect();
+    let off = |u: LengthUnit| (sized(u) / USUAL_M).ln().abs();
+    others.sort_by(|a, b| off(*a).total_cmp(&off(*b)));
+    let ways: Vec<String> =
+        others.iter().map(|u| format!("in {0} it would be {1:.2} m: say --units {0}", u.sign(), sized(*u))).collect();
+    let way = if ways.is_empty() {
+        "it is no motion of one part in m, cm or mm; cut it, or mend its columns".to_owned()
+    } else {
+        ways.join("; ")
     };
     Some(format!("the positions spread over {size:.0} m, which no hand that opens something does; {way}"))
 }

@@ -59,6 +59,7 @@ fn joints_of_the_wrong_shape_are_told_by_joint_and_field() {
         ),
         ("hinge_far.json", 2, "joint wall_door: origin: the hinge passes 29.5 m beside the part"),
         ("bare_list.json", 2, "is a list; an object is wanted"),
+        ("cut_off.json", 2, "the file is cut off"),
         ("units_inch.json", 2, "units: the text \"inch\" is given, \"m\", \"cm\", \"mm\" is wanted"),
         ("scene_missing.json", 2, "the key \"scene\" is missing"),
         ("comments.json", 2, "JSON has no comments"),
@@ -86,6 +87,7 @@ fn predictions_of_the_wrong_shape_are_told_by_row_and_field() {
         ),
         ("p_clip_int.json", "predictions[0] (rec): clip: the number 0 is given, a text in quotes is wanted"),
         ("p_bare_list.json", "a list of 7 is given, an object with \"predictions\" is wanted"),
+        ("p_lines.json", "line 2, column 1: trailing characters; one value a file is wanted"),
         ("p_opd.json", "a list of 1 is given, an object with \"predictions\" is wanted"),
         (
             "p_deg.json",
