@@ -65,11 +65,24 @@ pub(super) fn from_element(path: &Path, mut root: Element) -> Result<Model> {
     bounded(&out.model)?;
     let mut model = out.model;
     model.format = Format::Mjcf { radian: context.radian || !(out.angles || turned(&root)) };
-    refused.extend(mjcf_refusals::refusals(&context, &root, &copies, &model));
+    let (faults, notes) = mjcf_refusals::refusals(&context, &root, &copies, &model);
+    refused.extend(faults);
+    model.notes.extend(notes);
     refused.truncate(mjcf_schema::MAX_FAULTS);
     model.faults.extend(refused.into_iter().map(|f| (1, f)));
+    model.faults.extend(strays(path, &root).into_iter().map(|f| (4, f)));
     mjcf_equality::read(&context, &root, &mut model);
     Ok(model)
+}
+
+/// Bodies that are lost, as they stand beside the world.
+fn strays(path: &Path, root: &Element) -> Vec<String> {
+    let outside = root.children.iter().filter(|c| mjcf_schema::STRAY.contains(&c.name.as_str()));
+    let tell = |stray: &Element| {
+        let at = mjcf_schema::place(path, stray);
+        format!("{at}: stands outside <worldbody>, where MuJoCo passes over it without a word; move it in")
+    };
+    outside.map(tell).collect()
 }
 
 /// All names that elements have.
