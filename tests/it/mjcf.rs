@@ -276,6 +276,12 @@ fn includes_are_read_where_mujoco_reads_them() {
     let path = dir.path().join("m.xml");
     std::fs::write(&path, "<mujoco>\n<include file=\"gone.xml\"/>\n</mujoco>").unwrap();
     let points = check::model(&model::read(&path).unwrap(), None);
+    // What cannot be read without the missing file says so.
+    let other = dir.path().join("other.xml");
+    std::fs::write(&other, "<mujoco><include file=\"gone.xml\"/><worldbody><geom class=\"c\"/></worldbody></mujoco>")
+        .unwrap();
+    let error = model::read(&other).unwrap_err().to_string();
+    assert!(error.contains("includes gone.xml, which is not there") && error.contains("class \"c\""), "{error}");
     let fault = "line 2, <include>: includes gone.xml, which is not there";
     assert!(points[0].faults.iter().any(|f| f.contains(fault)), "{points:?}");
     assert_eq!(points[1].verdict, Verdict::NotJudged);

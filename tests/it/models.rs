@@ -37,6 +37,10 @@ fn what_simulators_refuse_of_a_urdf_is_a_fault() {
         ("two_axes", 1, "<axis> is there twice"),
         ("two_limits", 1, "<limit> is there twice"),
         ("visual_only", 5, "no hand can touch it"),
+        ("axis0", 1, "its axis is 0: MuJoCo refuses"),
+        ("inertia0", 1, "door: moves, and neither it nor what is fixed to it has mass and inertia"),
+        ("mass0", 1, "door: moves, and neither it nor what is fixed to it has mass and inertia"),
+        ("inertia_offdiag", 1, "its inertia has no positive moments"),
     ] {
         let model = model::read(&data(&format!("urdf/{name}.urdf"))).unwrap();
         let found = faults(&check::model(&model, None));
