@@ -36,7 +36,7 @@ fn what_simulators_refuse_of_a_urdf_is_a_fault() {
         ("empty_geometry", 1, "has no geometry: MuJoCo refuses"),
         ("two_axes", 1, "<axis> is there twice"),
         ("two_limits", 1, "<limit> is there twice"),
-        ("visual_only", 5, "no hand can touch it"),
+        ("visual_only", 5, "hands and things go through it"),
         ("axis0", 1, "its axis is 0: MuJoCo refuses"),
         ("inertia0", 1, "door: moves, and neither it nor what is fixed to it has mass and inertia"),
         ("mass0", 1, "door: moves, and neither it nor what is fixed to it has mass and inertia"),
