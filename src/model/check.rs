@@ -132,8 +132,8 @@ pub fn model(model: &Model, twin: Option<&Twin>) -> Vec<Point> {
         said.entry(*point).or_default().fault(fault.clone());
     }
     if !model.unread.is_empty() {
-        // The points about joints and shapes.
-        for point in [2, 3, 4, 5, 9, 11] {
+        // The points about joints and shapes; and what is not read may be what a simulator refuses.
+        for point in [1, 2, 3, 4, 5, 9, 11] {
             if let Some(said) = said.get_mut(&point) {
                 said.unjudged = true;
             }

@@ -41,9 +41,23 @@ pub(super) fn other_case(path: &Path) -> Option<String> {
 pub(super) struct Measured {
     /// Lowest and highest corner of its vertices; `Err` says why there are none.
     pub bounds: Result<[Point; 2], String>,
-    /// Why MuJoCo refuses it, in words behind its name.
+    /// Why MuJoCo refuses to read it, in words behind its name.
     pub refused: Option<String>,
+    /// Why there is nothing between its vertices, in words behind its name.
+    pub hollow: Option<String>,
+    /// Its vertices lie in one plane.
+    pub flat: bool,
 }
+
+impl Measured {
+    /// Without a look at its vertices.
+    fn unseen(why: String, refused: Option<String>) -> Self {
+        Self { bounds: Err(why), refused, hollow: None, flat: false }
+    }
+}
+
+/// What is said of a flat mesh, behind its name.
+pub(super) const FLAT: &str = "is flat; give it a thickness, or write a thin box";
 
 /// Lowest and highest corner of an OBJ or STL file's vertices; `Err` says why there are none.
 pub(super) fn bounds(path: &Path) -> Result<[Point; 2], String> {
@@ -56,17 +70,56 @@ struct Vertices {
     high: Vector,
     /// The first few that differ.
     distinct: Vec<[f64; 3]>,
+    span: Span,
+}
+
+/// What the vertices span so far. To simulators they are numbers of single precision, and are compared as such.
+enum Span {
+    Nothing,
+    Point(Vector),
+    /// A point, and the way to the next one.
+    Line(Vector, Vector),
+    /// A point, its distance to the next one, and the normal.
+    Plane(Vector, f64, Vector),
+    Space,
+}
+
+impl Span {
+    /// Adds a vertex; what is nearer than numbers can tell lies on it.
+    fn add(&mut self, p: Vector) {
+        const NEAR: f64 = 1e-15;
+        *self = match *self {
+            Span::Nothing => Span::Point(p),
+            Span::Point(a) if (p - a).norm() > NEAR => Span::Line(a, p - a),
+            Span::Line(a, along) => {
+                let across = along.cross(&(p - a));
+                let area = across.norm();
+                if area <= NEAR * along.norm() * (p - a).norm() {
+                    return;
+                }
+                Span::Plane(a, along.norm(), across / area)
+            }
+            Span::Plane(a, length, normal) if (normal.dot(&p) - normal.dot(&a)).abs() > NEAR * length => Span::Space,
+            _ => return,
+        };
+    }
 }
 
 /// Fewer have no volume.
 const MIN_VERTICES: usize = 4;
 
 impl Vertices {
+    fn new() -> Self {
+        let (low, high) = (Vector::repeat(f64::INFINITY), Vector::repeat(f64::NEG_INFINITY));
+        Self { low, high, distinct: Vec::new(), span: Span::Nothing }
+    }
+
     fn add(&mut self, p: [f64; 3]) {
         // Comparisons would pass over what is no number.
         if p.iter().all(|x| x.is_finite()) {
             self.low = self.low.inf(&Vector::from(p));
             self.high = self.high.sup(&Vector::from(p));
+            self.span.add(Vector::from(p.map(|x| f64::from(x as f32))));
         } else {
             (self.low, self.high) = (Vector::repeat(f64::NEG_INFINITY), Vector::repeat(f64::INFINITY));
         }
@@ -83,32 +136,44 @@ impl Vertices {
         }
     }
 
-    /// Why there is no solid between them.
-    fn refused(&self) -> Option<String> {
+    /// Why there is nothing between them.
+    fn hollow(&self) -> Option<String> {
         if self.distinct.len() < MIN_VERTICES {
             return Some(format!("has fewer than {MIN_VERTICES} vertices that differ"));
         }
-        let extent = self.high - self.low;
-        if !extent.iter().all(|x| x.is_finite()) {
+        if self.bounds().is_err() {
             return Some("has vertices that are not finite".to_owned());
         }
-        (extent.amin() <= 0.0).then(|| "is flat; give it a thickness, or write a thin box".to_owned())
+        matches!(self.span, Span::Nothing | Span::Point(_) | Span::Line(..))
+            .then(|| "has all its vertices on one line".to_owned())
     }
+
+    fn is_flat(&self) -> bool {
+        matches!(self.span, Span::Plane(..))
+    }
+}
+
+/// Why there is nothing between vertices, three numbers each, and whether they lie in one plane.
+pub(super) fn solid(vertices: &[f64]) -> (Option<String>, bool) {
+    let mut all = Vertices::new();
+    for vertex in vertices.chunks_exact(3) {
+        all.add([vertex[0], vertex[1], vertex[2]]);
+    }
+    (all.hollow(), all.is_flat())
 }
 
 /// Measures an OBJ or STL file.
 pub(super) fn measured(path: &Path) -> Measured {
     let bytes = match xml::read_bytes(path, xml::MAX_BYTES) {
         Ok(bytes) => bytes,
-        Err(e) => return Measured { bounds: Err(e.to_string()), refused: None },
+        Err(e) => return Measured::unseen(e.to_string(), None),
     };
     let pointer = "is a Git LFS pointer, not the mesh (run `git lfs pull`)";
     if kinds::is_pointer(&bytes) {
-        return Measured { bounds: Err(format!("it {pointer}")), refused: Some(pointer.to_owned()) };
+        return Measured::unseen(format!("it {pointer}"), Some(pointer.to_owned()));
     }
     let kind = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-    let mut vertices =
-        Vertices { low: Vector::repeat(f64::INFINITY), high: Vector::repeat(f64::NEG_INFINITY), distinct: Vec::new() };
+    let mut vertices = Vertices::new();
     let mut refused = None;
     match kind.as_str() {
         "obj" => text_vertices(&bytes, "v", &mut |p: [f64; 3]| vertices.add(p)),
@@ -129,11 +194,11 @@ pub(super) fn measured(path: &Path) -> Measured {
             let shown = if other.is_empty() { "no extension".to_owned() } else { format!(".{}", xml::brief(other)) };
             // MuJoCo's own format is read by nobody else.
             let refused = (other != "msh").then(|| format!("is not OBJ or binary STL ({shown})"));
-            let bounds = Err(format!("the format \"{}\" is not read (OBJ and STL are)", xml::brief(other)));
-            return Measured { bounds, refused };
+            let why = format!("the format \"{}\" is not read (OBJ and STL are)", xml::brief(other));
+            return Measured::unseen(why, refused);
         }
     }
-    Measured { bounds: vertices.bounds(), refused: refused.or_else(|| vertices.refused()) }
+    Measured { bounds: vertices.bounds(), refused, hollow: vertices.hollow(), flat: vertices.is_flat() }
 }
 
 /// What MuJoCo's reader of STL takes at most.

@@ -22,7 +22,7 @@ use super::{
     Format, Kind, Link, MassSource, Model, ModelJoint, bounded, mjcf_assets, mjcf_equality, mjcf_refusals, mjcf_schema,
     named,
 };
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::math::{Point, Pose, Vector};
 
 /// The body that everything stands in.
@@ -50,14 +50,24 @@ pub(super) fn from_element(path: &Path, mut root: Element) -> Result<Model> {
     }
     let mut included = Includes { model: path, read: path.canonicalize().into_iter().collect(), missing: Vec::new() };
     included.expand(&mut root, 0)?;
+    let missing = included.missing;
+    // What is missing may hold what the rest names.
+    whole(path, root, &missing).map_err(|e| match missing.first() {
+        Some(first) => Error::format(path, "include", format!("{first}: bring the file; without it: {e}")),
+        None => e,
+    })
+}
+
+/// A model from all of its files; `missing` are those that are not there, in words.
+fn whole(path: &Path, mut root: Element, missing: &[String]) -> Result<Model> {
     let context = Context::read(path, &root)?;
-    let mut refused: Vec<String> = included.missing.iter().map(|m| format!("{m}; MuJoCo refuses the model")).collect();
+    let mut refused: Vec<String> = missing.iter().map(|m| format!("{m}; MuJoCo refuses the model")).collect();
     refused.extend(mjcf_schema::violations(path, &root));
     refused.extend(mjcf_assets::missing(path, &root, &context.folders));
     let mut copies = Copies::default();
     copies.expand(&context, &mut root)?;
     let mut out = Builder::new(path, &root);
-    out.model.unread = included.missing;
+    out.model.unread = missing.to_vec();
     for section in &root.children {
         out.section(&context, section, &copies)?;
     }
@@ -65,11 +75,24 @@ pub(super) fn from_element(path: &Path, mut root: Element) -> Result<Model> {
     bounded(&out.model)?;
     let mut model = out.model;
     model.format = Format::Mjcf { radian: context.radian || !(out.angles || turned(&root)) };
-    refused.extend(mjcf_refusals::refusals(&context, &root, &copies, &model));
+    let (faults, notes) = mjcf_refusals::refusals(&context, &root, &copies, &model);
+    refused.extend(faults);
+    model.notes.extend(notes);
     refused.truncate(mjcf_schema::MAX_FAULTS);
     model.faults.extend(refused.into_iter().map(|f| (1, f)));
+    model.faults.extend(strays(path, &root).into_iter().map(|f| (4, f)));
     mjcf_equality::read(&context, &root, &mut model);
     Ok(model)
+}
+
+/// Bodies that are lost, as they stand beside the world.
+fn strays(path: &Path, root: &Element) -> Vec<String> {
+    let outside = root.children.iter().filter(|c| mjcf_schema::STRAY.contains(&c.name.as_str()));
+    let tell = |stray: &Element| {
+        let at = mjcf_schema::place(path, stray);
+        format!("{at}: stands outside <worldbody>, where MuJoCo passes over it without a word; move it in")
+    };
+    outside.take(mjcf_schema::MAX_FAULTS).map(tell).collect()
 }
 
 /// All names that elements have.

@@ -1,12 +1,14 @@
 //! The files that an MJCF needs beside itself: meshes, pictures, height fields. They are looked for where MuJoCo does.
 
+use std::cell::OnceCell;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use nalgebra::UnitQuaternion;
 
-use super::mesh;
+use super::mesh::{self, Measured};
 use super::mjcf_schema::place;
 use super::xml::{Element, brief};
 use crate::math::{Point, Vector};
@@ -57,8 +59,8 @@ pub(super) enum Source {
     File(PathBuf),
     /// They are written in the model: lowest and highest corner.
     Written([Point; 2]),
-    /// The simulator makes it.
-    Made,
+    /// The simulator makes it; whether it is a flat plate.
+    Made(bool),
 }
 
 /// A mesh of `<asset>`.
@@ -70,16 +72,30 @@ pub(super) struct Mesh {
     pub(super) origin: Vector,
     /// `refquat`: what of the file becomes the axes.
     pub(super) turn: UnitQuaternion<f64>,
+    /// Its mass lies in its surface (`inertia="shell"`), which may be flat.
+    pub(super) shell: bool,
+    /// Whether it has no volume, once asked for.
+    pub(super) thin: OnceCell<bool>,
 }
 
 impl Mesh {
+    /// Whether it is there, and has no volume that others could run into. A flat file that is no shell is refused whoever
+    /// shows it.
+    pub(super) fn is_thin(&self) -> bool {
+        *self.thin.get_or_init(|| match &self.source {
+            Source::File(path) => self.shell && mesh::measured(path).flat,
+            Source::Written(_) => false,
+            Source::Made(plate) => *plate,
+        })
+    }
+
     /// Lowest and highest corner as the simulator has it, metres; `Err` says why there are none.
     pub(super) fn bounds(&self) -> Result<[Point; 2], String> {
         let [low, high] = match &self.source {
             Source::File(path) if !path.is_file() => return Err("there is no such file".to_owned()),
             Source::File(path) => mesh::bounds(path)?,
             Source::Written(corners) => *corners,
-            Source::Made => return Err("the simulator makes it itself".to_owned()),
+            Source::Made(_) => return Err("the simulator makes it itself".to_owned()),
         };
         let mut ends = [Vector::repeat(f64::INFINITY), Vector::repeat(f64::NEG_INFINITY)];
         for corner in 0..8 {
@@ -93,13 +109,17 @@ impl Mesh {
 }
 
 /// The six sides of a cube's picture, and the picture of everything else.
-const PICTURES: [&str; 7] = ["file", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback"];
+pub(super) const PICTURES: [&str; 7] = ["file", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback"];
 
 /// Files of `<asset>` that are not there, or that MuJoCo does not read.
 pub(super) fn missing(model: &Path, root: &Element, folders: &Folders) -> Vec<String> {
     let mut faults = Vec::new();
+    let shells = root.all("default").any(shell_by_default);
+    // A file that many meshes show is read once.
+    let mut measured: BTreeMap<PathBuf, Measured> = BTreeMap::new();
     for asset in root.children.iter().filter(|c| ["asset", "deformable"].contains(&c.name.as_str())) {
         for element in &asset.children {
+            let before = faults.len();
             let mut needs = |attribute: &str, folder: &Path, endings: &[&str]| {
                 let Some(file) = element.get(attribute).filter(|f| !f.is_empty()) else { return };
                 // What says its own type need not say it by its ending.
@@ -114,15 +134,62 @@ pub(super) fn missing(model: &Path, root: &Element, folders: &Folders) -> Vec<St
                     PICTURES.iter().for_each(|attribute| needs(attribute, &folders.texture, &["png", "ktx"]));
                 }
                 "hfield" | "skin" => needs("file", &folders.mesh, &[]),
+                "model" => needs("file", Path::new(""), &[]),
                 _ => {}
             }
             let from_nothing = |what: &str| element.get(what).is_none() && element.child("plugin").is_none();
             if element.name == "mesh" && ["file", "vertex", "builtin"].into_iter().all(from_nothing) {
                 faults.push(format!("{}: has neither file nor vertices; MuJoCo refuses it", place(model, element)));
             }
+            if element.name == "mesh" && faults.len() == before {
+                let shell = element.get("inertia").map_or(shells, |i| i == "shell");
+                let file = element.get("file").filter(|f| !f.is_empty()).map(|f| folders.mesh(model, f));
+                let found = file
+                    .filter(|f| f.is_file())
+                    .map(|f| measured.entry(f).or_insert_with_key(|f| mesh::measured(f)).clone());
+                if let Some(why) = no_solid(element, found.as_ref(), shell) {
+                    faults.push(format!("{}: {why}; MuJoCo refuses it", place(model, element)));
+                }
+            }
         }
     }
     faults
+}
+
+/// Whether a default says that meshes are shells.
+fn shell_by_default(default: &Element) -> bool {
+    default.all("mesh").any(|m| m.get("inertia") == Some("shell")) || default.all("default").any(shell_by_default)
+}
+
+/// Why a mesh is no solid: from its file where it has one, else from the vertices that are written; `shell` says that it
+/// need not be one.
+fn no_solid(element: &Element, file: Option<&Measured>, shell: bool) -> Option<String> {
+    let scaled_away = element.numbers::<3>("scale").ok().flatten().is_some_and(|s| s.contains(&0.0));
+    if scaled_away && !shell {
+        return Some("its scale leaves no volume".to_owned());
+    }
+    let numbers = |attribute: &str| {
+        let text = element.get(attribute).filter(|t| !t.trim().is_empty())?;
+        element.parse(attribute, text, 0..=usize::MAX).ok()
+    };
+    let flat = |flat: bool| (flat && !shell).then(|| mesh::FLAT.to_owned());
+    if let Some(found) = file {
+        return found.hollow.clone().or_else(|| flat(found.flat));
+    }
+    let vertices = numbers("vertex")?;
+    if vertices.len() % 3 != 0 {
+        return Some(format!("vertex has {} numbers, and each vertex three", vertices.len()));
+    }
+    let faces = numbers("face").unwrap_or_default();
+    if faces.len() % 3 != 0 {
+        return Some(format!("face has {} numbers, and each triangle three", faces.len()));
+    }
+    let count = vertices.len() / 3;
+    if let Some(index) = faces.iter().find(|i| !(0.0..count as f64).contains(*i)) {
+        return Some(format!("a face names vertex {index}, there are {count}"));
+    }
+    let (hollow, is_flat) = mesh::solid(&vertices);
+    hollow.or_else(|| flat(is_flat))
 }
 
 /// MuJoCo's limit.
@@ -176,18 +243,38 @@ mod tests {
     fn a_file_that_mujoco_refuses_is_told_from_one_that_it_reads() {
         let dir = tempfile::tempdir().unwrap();
         let write = |name: &str, bytes: &[u8]| std::fs::write(dir.path().join(name), bytes).unwrap();
+        let corners = [[0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let mut stl = vec![0u8; 80];
-        stl.extend(1u32.to_le_bytes());
-        stl.extend([0u8; 50]);
+        stl.extend(4u32.to_le_bytes());
+        for triangle in [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]] {
+            stl.extend([0u8; 12]);
+            stl.extend(triangle.into_iter().flat_map(|i: usize| corners[i]).flat_map(f32::to_le_bytes));
+            stl.extend([0u8; 2]);
+        }
         write("good.stl", &stl);
         write("text.stl", b"solid x\nfacet\nendsolid\n");
         write("pointer.obj", b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n");
         write("picture.jpg", b"x");
-        write("good.obj", b"v 0 0 0\n");
+        write("good.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+        write("three.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+        write("line.obj", b"v 0 0 0\nv 1 1 1\nv 2 2 2\nv 3 3 3\nf 1 2 3\nf 2 4 3\n");
+        write("tilted.obj", b"v 0 0 0\nv 1 0 1\nv 0 1 0\nv 1 1 1\nf 1 2 3\nf 2 4 3\n");
+        write("small.obj", b"v 0 0 0\nv 1e-7 0 0\nv 0 1e-7 0\nv 0 0 1e-7\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
         for (body, word) in [
             ("<mesh file=\"good.stl\"/>", ""),
             ("<mesh file=\"good.obj\"/>", ""),
-            ("<mesh name=\"w\" vertex=\"0 0 0\"/>", ""),
+            ("<mesh file=\"small.obj\" scale=\"1e6 1e6 1e6\"/>", ""),
+            ("<mesh file=\"three.obj\"/>", "fewer than 4 vertices"),
+            ("<mesh file=\"line.obj\" inertia=\"shell\"/>", "on one line"),
+            ("<mesh file=\"tilted.obj\"/>", "is flat"),
+            ("<mesh file=\"tilted.obj\" inertia=\"shell\"/>", ""),
+            ("<mesh file=\"good.obj\" scale=\"0 1 1\"/>", "leaves no volume"),
+            ("<mesh name=\"w\" vertex=\"0 0 0 1 0 0 0 1 0 0 0 1\"/>", ""),
+            ("<mesh name=\"w\" vertex=\"0 0 0 1 0 0 0 1 0\"/>", "fewer than 4 vertices"),
+            ("<mesh name=\"w\" vertex=\"0 0 0 1 0 0 0 1 0 1 1 0\"/>", "is flat"),
+            ("<mesh name=\"w\" vertex=\"0 0 0 1 0 0 0 1 0 0 0\"/>", "each vertex three"),
+            ("<mesh name=\"w\" vertex=\"0 0 0 1 0 0 0 1 0 0 0 1\" face=\"0 1 5\"/>", "a face names vertex 5"),
+            ("<model name=\"m\" file=\"gone.xml\"/>", "gone.xml: there is no such file"),
             ("<texture builtin=\"flat\" file=\"gone.png\"/>", ""),
             ("<mesh name=\"n\"/>", "neither file nor vertices"),
             ("<mesh file=\"gone.obj\"/>", "gone.obj: there is no such file"),

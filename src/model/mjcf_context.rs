@@ -1,11 +1,13 @@
 //! What holds for a whole MJCF: its compiler's settings, default classes, meshes.
 
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
 
 use super::mjcf_assets::{Folders, Mesh, Source};
+use super::weights::Mended;
 use super::xml::{self, Element};
 use crate::error::Result;
 use crate::math::{Point, Pose, Vector, rotation, unit};
@@ -34,8 +36,8 @@ pub(super) struct Context {
     pub(super) from_shapes: Option<bool>,
     /// Groups of geoms that weigh something, from and to.
     pub(super) weighing: [f64; 2],
-    /// Whether light bodies are made heavier than nothing.
-    pub(super) bounded: bool,
+    /// What is mended of masses and inertias.
+    pub(super) mended: Mended,
     /// What all bodies are scaled to weigh together, kg.
     pub(super) total: Option<f64>,
     pub(super) classes: BTreeMap<String, Class>,
@@ -54,7 +56,7 @@ impl Context {
             folders: Folders::default(),
             from_shapes: None,
             weighing: [0.0, 5.0],
-            bounded: false,
+            mended: Mended::default(),
             total: None,
             classes: BTreeMap::from([(MAIN.to_owned(), Class::new())]),
             class_bytes: 0,
@@ -78,7 +80,10 @@ impl Context {
             context.weighing = compiler.numbers::<2>("inertiagrouprange")?.unwrap_or(context.weighing);
             context.total = compiler.number("settotalmass")?.filter(|m| *m > 0.0).or(context.total);
             for bound in ["boundmass", "boundinertia"] {
-                context.bounded |= compiler.number(bound)?.is_some_and(|b| b > 0.0);
+                context.mended.bounded |= compiler.number(bound)?.is_some_and(|b| b > 0.0);
+            }
+            if let Some(value) = compiler.get("balanceinertia") {
+                context.mended.balanced = value == "true";
             }
             match compiler.get("inertiafromgeom") {
                 Some("true") => context.from_shapes = Some(true),
@@ -120,13 +125,14 @@ impl Context {
         let source = match (file, corners(asset)?) {
             (Some(file), _) => Source::File(self.folders.mesh(model, file)),
             (None, Some(corners)) => Source::Written(corners),
-            (None, None) => Source::Made,
+            (None, None) => Source::Made(asset.get("builtin") == Some("plate")),
         };
         let stem = file.and_then(|f| f.rsplit(['/', '\\']).next()).map(Path::new).and_then(Path::file_stem);
         let Some(name) = asset.get("name").map(str::to_owned).or(stem.map(|s| s.to_string_lossy().into_owned())) else {
             return Ok(());
         };
-        self.meshes.insert(name, Mesh { source, scale, origin, turn });
+        let shell = r.get("inertia") == Some("shell");
+        self.meshes.insert(name, Mesh { source, scale, origin, turn, shell, thin: OnceCell::new() });
         Ok(())
     }
 

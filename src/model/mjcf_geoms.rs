@@ -98,7 +98,7 @@ fn weighs(c: &Context, r: &Resolved) -> Result<bool> {
 }
 
 /// `contype` and `conaffinity`; both are 1 unless the file says otherwise.
-fn masks(r: &Resolved) -> Result<[u32; 2]> {
+pub(super) fn masks(r: &Resolved) -> Result<[u32; 2]> {
     let mask = |attribute: &str| -> Result<u32> {
         // Masks are whole numbers of 32 bits; what is outside meets everything.
         Ok(r.number(attribute)?

@@ -1,22 +1,35 @@
 //! What MuJoCo refuses though each element by itself is allowed: names that name nothing, names twice, bodies that cannot
-//! move, keyframes of another model.
+//! move, keyframes of another model. The values of single elements are in `mjcf_values`.
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::mjcf_assets::Mesh;
 use super::mjcf_context::{Context, MAIN, Resolved};
 use super::mjcf_schema::{Row, Value, place};
 use super::mjcf_tree::Copies;
 use super::xml::{Element, brief};
-use super::{Kind, Link, MassSource, Model, mjcf};
+use super::{Kind, Model, mjcf, mjcf_geoms, mjcf_values, weights};
 
-/// Everything of this kind; `root` is the whole tree, with copies made.
-pub(super) fn refusals(c: &Context, root: &Element, copies: &Copies, model: &Model) -> Vec<String> {
-    let mut out = Refusals { c, copies, model, names: BTreeMap::new(), faults: Vec::new(), mocaps: 0 };
+/// Everything of this kind, and what is only worth a note; `root` is the whole tree, with copies made.
+pub(super) fn refusals(c: &Context, root: &Element, copies: &Copies, model: &Model) -> (Vec<String>, Vec<String>) {
+    let joints = model.joints.iter().map(|j| (j.name.as_str(), j)).collect();
+    let mut out = Refusals {
+        c,
+        copies,
+        model,
+        joints,
+        names: BTreeMap::new(),
+        attaches: false,
+        faults: Vec::new(),
+        notes: Vec::new(),
+        mocaps: 0,
+        actuators: root.all("actuator").map(|a| a.children.len()).sum(),
+    };
     if let Some(row) = Row::root() {
         out.names.entry("body").or_default().insert(mjcf::WORLD.to_owned());
         out.names.entry("default").or_default().insert(MAIN.to_owned());
         out.collect(root, row);
-        let at = At { class: None, moving: false, below_world: true, default: false };
+        let at = At { class: None, moving: false, below_world: true, weighs: false, default: false };
         out.element(root, row, at);
     }
     for default in root.all("default") {
@@ -24,12 +37,12 @@ pub(super) fn refusals(c: &Context, root: &Element, copies: &Copies, model: &Mod
             out.fault(default, format!("the outermost class is \"{MAIN}\", not \"{}\"", brief(class)));
         }
     }
-    out.weightless();
+    out.faults.extend(weights::refused(model, c.mended));
     // What was not read may have joints that a keyframe counts.
     if model.unread.is_empty() {
         root.all("keyframe").flat_map(|k| k.all("key")).for_each(|key| out.keyframe(key));
     }
-    out.faults
+    (out.faults, out.notes)
 }
 
 /// Where an element stands.
@@ -41,6 +54,8 @@ struct At<'a> {
     moving: bool,
     /// Right in the world, or in frames of it.
     below_world: bool,
+    /// In a body that weighs what its geoms weigh.
+    weighs: bool,
     /// In a default class.
     default: bool,
 }
@@ -49,13 +64,18 @@ struct Refusals<'a> {
     c: &'a Context,
     copies: &'a Copies,
     model: &'a Model,
+    joints: mjcf_values::Joints<'a>,
     /// Names by kind.
     names: BTreeMap<&'static str, BTreeSet<String>>,
+    /// Whether other models are attached.
+    attaches: bool,
     faults: Vec<String>,
+    notes: Vec<String>,
     mocaps: usize,
+    actuators: usize,
 }
 
-/// Kinds that the file itself must have, whatever is attached to it.
+/// Kinds that the file itself must have, unless other models, which bring their own, are attached.
 const ALWAYS_READ: [&str; 4] = ["default", "material", "texture", "hfield"];
 
 impl Refusals<'_> {
@@ -66,6 +86,7 @@ impl Refusals<'_> {
 
     /// All names, and a fault for each that is there twice.
     fn collect(&mut self, element: &Element, row: &'static Row) {
+        self.attaches |= element.name == "attach";
         for (attribute, known) in &row.attributes {
             let Value::Own(kind) = known.value else { continue };
             let Some(name) = own_name(element, attribute, kind) else { continue };
@@ -100,18 +121,30 @@ impl Refusals<'_> {
                 self.look_up(element, if kind == "xbody" { "body" } else { kind }, name);
             }
         }
+        if !at.default
+            && let Some(wrong) = mjcf_values::wrong(&resolved, row, &self.joints)
+        {
+            self.fault(element, wrong);
+        }
         let mut inside = At { class: element.get("childclass").or(at.class), ..at };
         match element.name.as_str() {
             "default" => inside.default = true,
             "body" if !at.default => {
-                self.body(element, at);
+                self.body(element, inside.class, at);
                 let is_mocap = element.get("mocap") == Some("true");
                 inside.moving = !is_mocap && (at.moving || !joints(element).is_empty());
                 inside.below_world = false;
+                inside.weighs = element.child("inertial").is_none() || c.from_shapes == Some(true);
             }
             // Other elements have the same tags: parts of tendons, of equalities.
             "geom" if !at.default && row.attributes.contains_key("fromto") => self.geom(element, &resolved, at),
-            "joint" if !at.default && row.attributes.contains_key("springref") => self.joint(element, &resolved),
+            "freejoint" if at.below_world => self.fault(element, "the world has no joints"),
+            "joint" if !at.default && row.attributes.contains_key("springref") => {
+                if at.below_world {
+                    self.fault(element, "the world has no joints");
+                }
+                self.joint(element, &resolved);
+            }
             "actuator" => element.children.iter().for_each(|a| self.actuator(a)),
             _ => {}
         }
@@ -124,14 +157,15 @@ impl Refusals<'_> {
 
     fn look_up(&mut self, element: &Element, kind: &str, name: &str) {
         // What was not read may have the name.
-        let judged = self.model.unread.is_empty() || ALWAYS_READ.contains(&kind);
+        let judged = self.model.unread.is_empty() || (ALWAYS_READ.contains(&kind) && !self.attaches);
         let known = self.names.get(kind).is_some_and(|names| names.contains(name)) || self.copies.has(name);
         if judged && !known && !name.is_empty() {
             self.fault(element, format!("there is no {} \"{}\"", brief(kind), brief(name)));
         }
     }
 
-    fn body(&mut self, element: &Element, at: At) {
+    /// `class` is the one that holds for what is in the body.
+    fn body(&mut self, element: &Element, class: Option<&str>, at: At) {
         let joints = joints(element);
         if element.get("mocap") == Some("true") {
             self.mocaps += 1;
@@ -139,9 +173,15 @@ impl Refusals<'_> {
                 self.fault(element, "what is moved from outside (mocap) stands right in the world and has no joints");
             }
         }
-        let is_free = |j: &&Element| j.name == "freejoint" || j.get("type") == Some("free");
-        if joints.len() > 1 && joints.iter().any(is_free) {
-            self.fault(element, "a free joint must be the only one of its body");
+        let c = self.c;
+        let kind = |joint: &Element| match joint.name.as_str() {
+            "freejoint" => "free".to_owned(),
+            _ => c.resolved(joint, class).ok().and_then(|r| r.get("type")).unwrap_or("hinge").to_owned(),
+        };
+        let kinds: Vec<String> = joints.into_iter().map(kind).collect();
+        let kinds: Vec<&str> = kinds.iter().map(String::as_str).collect();
+        if let Some(wrong) = mjcf_values::together(&kinds) {
+            self.fault(element, wrong);
         }
     }
 
@@ -157,7 +197,17 @@ impl Refusals<'_> {
             "hfield" if r.get("hfield").is_none_or(str::is_empty) => {
                 self.fault(element, "a height field needs its hfield")
             }
+            "mesh" if r.get("mesh").and_then(|m| self.c.meshes.get(m)).is_some_and(Mesh::is_thin) && collides(r) => {
+                self.fault(
+                    element,
+                    "its mesh is flat and cannot collide: take a thin box, or contype=\"0\" conaffinity=\"0\"",
+                );
+            }
             _ => {}
+        }
+        let first = |attribute: &str| r.number(attribute).ok().flatten();
+        if at.weighs && first("mass").or_else(|| first("density")).is_some_and(|m| m < 0.0) {
+            self.fault(element, "its mass or density is negative");
         }
         if r.get("fromto").is_some() {
             if !["capsule", "cylinder", "box", "ellipsoid"].contains(&kind) {
@@ -189,29 +239,9 @@ impl Refusals<'_> {
         if TARGETS.into_iter().all(|t| element.get(t).is_none_or(str::is_empty)) {
             self.fault(element, "moves nothing: name a joint, tendon, site or body");
         }
-    }
-
-    /// Bodies that move, and of which neither they nor what is fixed to them weigh anything.
-    fn weightless(&mut self) {
-        let Ok(tree) = self.model.tree() else { return };
-        if self.c.bounded || !self.model.unread.is_empty() {
-            return;
-        }
-        let model = self.model;
-        let links = &model.links;
-        let mut weighs = vec![false; links.len()];
-        for (link, body) in links.iter().zip(&tree.body) {
-            weighs[*body] |= has_weight(link);
-        }
-        for joint in &model.joints {
-            let Some(child) = links.iter().position(|l| l.name == joint.child) else { continue };
-            if joint.kind != Kind::Fixed && !links[child].between && !weighs[tree.body[child]] {
-                self.faults.push(format!(
-                    "{}: moves, and neither it nor what is fixed to it has mass and inertia: MuJoCo refuses it; write \
-                     <inertial>, or a density for its shapes",
-                    joint.child
-                ));
-            }
+        let class = self.c.classes.get(element.get("class").unwrap_or(MAIN));
+        if let Some(wrong) = mjcf_values::actuator(element, class, self.c.autolimits) {
+            self.fault(element, wrong);
         }
     }
 
@@ -226,26 +256,31 @@ impl Refusals<'_> {
             };
             self.model.joints.iter().map(|j| of(j.kind)).sum()
         };
-        let wanted =
-            [("qpos", count(7, 4)), ("qvel", count(6, 3)), ("mpos", 3 * self.mocaps), ("mquat", 4 * self.mocaps)];
+        let wanted = [
+            ("qpos", count(7, 4)),
+            ("qvel", count(6, 3)),
+            ("mpos", 3 * self.mocaps),
+            ("mquat", 4 * self.mocaps),
+            ("ctrl", self.actuators),
+        ];
         for (attribute, wanted) in wanted {
             let have = key.get(attribute).map_or(0, |text| text.split_ascii_whitespace().count());
-            if have != 0 && have != wanted {
+            if have > wanted {
                 self.fault(key, format!("{attribute} has {have} numbers, the model {wanted}"));
+            } else if have != 0 && have < wanted {
+                let at = place(&self.model.source, key);
+                self.notes.push(format!(
+                    "{at}: {attribute} has {have} numbers, the model {wanted}; MuJoCo takes the rest from the model, and \
+                     before 3.17 it may refuse the file"
+                ));
             }
         }
     }
 }
 
-/// Whether MuJoCo finds mass and inertia in a link; what only a mesh would tell is taken to have both.
-fn has_weight(link: &Link) -> bool {
-    // Below this MuJoCo takes a number for 0, kg and kg m^2.
-    const NOTHING: f64 = 1e-15;
-    match (link.mass_source, link.mass) {
-        (MassSource::Nothing, _) | (MassSource::Stated, None) => false,
-        (_, None) => true,
-        (_, Some(mass)) => mass > NOTHING && (0..3).all(|k| link.inertia[(k, k)] > NOTHING),
-    }
+/// Whether a geom takes part in contacts by its own masks.
+fn collides(r: &Resolved) -> bool {
+    mjcf_geoms::masks(r).is_ok_and(|masks| masks != [0, 0])
 }
 
 /// The joints of a body, through its frames.
@@ -321,7 +356,8 @@ mod tests {
             ),
             ("<attach model=\"m\" prefix=\"p_\"/>", "<actuator><motor joint=\"p_j\"/></actuator>"),
         ] {
-            let asset = "<asset><model name=\"m\" file=\"other.xml\"/></asset>";
+            // Any file that is there: what is attached is not read.
+            let asset = "<asset><model name=\"m\" file=\"Cargo.toml\"/></asset>";
             let found = faults(&format!("<mujoco>{asset}<worldbody>{DOOR}{body}</worldbody>{rest}</mujoco>"));
             assert!(found.is_empty(), "{body}{rest}: {found:?}");
         }

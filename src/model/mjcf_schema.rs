@@ -139,7 +139,7 @@ fn element(model: &Path, e: &Element, row: &Row, faults: &mut Vec<String>) {
             None if row.open => {}
             None => fault(format!("<{}> has no attribute \"{}\" in MJCF", brief(&e.name), brief(name))),
             Some(known) => {
-                if let Some(wrong) = wrong_value(&known.value, text) {
+                if let Some(wrong) = wrong_value(name, &known.value, text) {
                     fault(format!("{name}=\"{}\": {wrong}", brief(text)));
                 }
             }
@@ -148,9 +148,17 @@ fn element(model: &Path, e: &Element, row: &Row, faults: &mut Vec<String>) {
     for name in row.attributes.iter().filter(|(n, a)| a.required && e.get(n).is_none()).map(|(n, _)| n) {
         fault(format!("<{}> needs the attribute \"{name}\"", brief(&e.name)));
     }
+    let given = |way: &&str| row.attributes.contains_key(*way) && e.get(*way).is_some_and(|v| !v.trim().is_empty());
+    if WAYS.iter().copied().filter(given).count() > 1 {
+        fault(format!("more than one of {} says how it is turned", WAYS.join(", ")));
+    }
     let mut seen: Vec<&str> = Vec::new();
     for child in &e.children {
         let Some((rule, below)) = row.child(&child.name) else {
+            if let Some(below) = stray(e, child) {
+                element(model, child, below, faults);
+                continue;
+            }
             let inside = brief(&e.name);
             faults.push(format!("{}: MJCF has no such element in <{inside}>; MuJoCo refuses it", place(model, child)));
             continue;
@@ -172,13 +180,41 @@ fn element(model: &Path, e: &Element, row: &Row, faults: &mut Vec<String>) {
     }
 }
 
+/// Elements that MuJoCo passes over right in `<mujoco>`, though it looks at their spelling.
+pub(super) const STRAY: [&str; 2] = ["body", "frame"];
+
+/// The row of an element that is passed over.
+fn stray(parent: &Element, child: &Element) -> Option<&'static Row> {
+    (parent.name == "mujoco" && STRAY.contains(&child.name.as_str())).then(|| ROWS.get(child.name.as_str())).flatten()
+}
+
+/// Ways to say how something is turned; a whole tensor turns an inertia, too.
+const WAYS: [&str; 6] = ["quat", "axisangle", "xyaxes", "zaxis", "euler", "fullinertia"];
+
+/// Attributes of whole numbers.
+const WHOLE: [&str; 10] = [
+    "group",
+    "contype",
+    "conaffinity",
+    "condim",
+    "priority",
+    "iterations",
+    "ls_iterations",
+    "noslip_iterations",
+    "nrow",
+    "ncol",
+];
+
 /// What is wrong with an attribute's text. No numbers at all count as not written.
-fn wrong_value(value: &Value, text: &str) -> Option<String> {
+fn wrong_value(name: &str, value: &Value, text: &str) -> Option<String> {
     let words: Vec<&str> = text.split_ascii_whitespace().collect();
     match value {
         Value::Numbers(from, to) if !words.is_empty() => {
             if let Some(word) = words.iter().find(|w| w.parse::<f64>().is_err()) {
                 return Some(format!("\"{}\" is no number", brief(word)));
+            }
+            if let Some(word) = words.iter().find(|w| WHOLE.contains(&name) && w.parse::<i32>().is_err()) {
+                return Some(format!("\"{}\" is no whole number of 32 bits", brief(word)));
             }
             let range = if from == to { from.to_string() } else { format!("{from} to {to}") };
             (!(*from..=*to).contains(&words.len())).then(|| format!("expected {range} numbers"))

@@ -21,6 +21,7 @@ mod mjcf_geoms;
 mod mjcf_refusals;
 mod mjcf_schema;
 mod mjcf_tree;
+mod mjcf_values;
 mod parts;
 mod places;
 mod rigid_bodies;
@@ -29,6 +30,7 @@ mod sweep;
 mod traps;
 pub mod urdf;
 mod urdf_geometry;
+mod weights;
 mod xml;
 
 pub use kinds::is_gltf;

@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion};
 
 use super::urdf_geometry::{Compiler, Geometry};
 use super::xml::{self, Element};
-use super::{Format, Kind, Link, MassSource, Model, ModelJoint, bounded, named};
+use super::{Format, Kind, Link, MassSource, Model, ModelJoint, bounded, mjcf_values, named, weights};
 use crate::error::{Error, Result};
 use crate::math::{Point, Pose, Vector};
 
@@ -38,6 +38,7 @@ pub(super) fn from_element(path: &Path, text: &str, root: &Element) -> Result<Mo
     let compiler = Compiler::of(root);
     let keeps_links = compiler.keeps_links && compiler.keeps_visuals;
     let fuses = !compiler.keeps_links;
+    let mended = compiler.mended;
     let complaint = urdf_rs::read_from_string(text).err().map(|e| one_line(&e.to_string()));
     let mut geometry = Geometry::new(path, compiler);
     let mut mimics = Vec::new();
@@ -84,6 +85,8 @@ pub(super) fn from_element(path: &Path, text: &str, root: &Element) -> Result<Mo
     model.notes.extend(notes);
     found.extend(mimicked(&model, &mimics));
     found.extend(floating(&model, fuses));
+    found.extend(without_axis(&model));
+    found.extend(weights::refused(&model, mended));
     if let Format::Urdf { faults, .. } = &mut model.format {
         *faults = found;
     }
@@ -151,6 +154,12 @@ fn floating(model: &Model, fuses: bool) -> Vec<String> {
         })
     };
     (0..model.links.len()).filter_map(hangs).collect()
+}
+
+/// Hinges and slides whose axis has no direction.
+fn without_axis(model: &Model) -> Vec<String> {
+    let short = model.moving().filter(|(_, j)| j.axis.norm() <= mjcf_values::MIN_AXIS);
+    short.map(|(_, j)| format!("{}: its axis is 0: MuJoCo refuses the file", j.name)).collect()
 }
 
 /// The first element that xacro has not replaced.

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::mesh::{self, Measured};
 use super::shapes::Primitive;
+use super::weights::Mended;
 use super::xml::{self, Element};
 use super::{Link, Shape, kinds};
 use crate::error::Result;
@@ -26,6 +27,8 @@ pub(super) struct Compiler {
     pub keeps_visuals: bool,
     /// Whether links that a fixed joint carries stay bodies of their own.
     pub keeps_links: bool,
+    /// What is mended of masses and inertias.
+    pub mended: Mended,
 }
 
 impl Compiler {
@@ -40,6 +43,9 @@ impl Compiler {
             out.strips_paths |= is("strippath", "true");
             out.keeps_visuals |= is("discardvisual", "false");
             out.keeps_links |= is("fusestatic", "false");
+            out.mended.balanced |= is("balanceinertia", "true");
+            let bounds = |name: &str| compiler.number(name).ok().flatten().is_some_and(|b| b > 0.0);
+            out.mended.bounded |= bounds("boundmass") || bounds("boundinertia");
         }
         out
     }
@@ -218,7 +224,8 @@ impl<'a> Geometry<'a> {
             self.faults.push(format!("{link}: mesh {shown} has a backslash: PyBullet and others find it only with /"));
         }
         let measured = self.measured.entry(found).or_insert_with_key(|found| mesh::measured(found)).clone();
-        match &measured.refused {
+        let flat = measured.flat.then(|| mesh::FLAT.to_owned());
+        match measured.refused.as_ref().or(measured.hollow.as_ref()).or(flat.as_ref()) {
             Some(why) if mujoco => self.faults.push(format!("{link}: mesh {shown} {why}: MuJoCo refuses the file")),
             _ => {}
         }

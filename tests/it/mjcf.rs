@@ -40,6 +40,7 @@ fn what_mujoco_refuses_does_not_load_without_a_word() {
         ("keyframe_bad", "qpos has 3 numbers, the model 1"),
         ("limited_true_norange", "which is no range"),
         ("material_unknown", "there is no material \"wood\""),
+        ("mesh_builtin", "its mesh is flat and cannot collide"),
         ("mesh_missing", "nowhere.obj: there is no such file"),
         ("plane_body", "a plane may only stand still"),
         ("texture_missing", "no.png: there is no such file"),
@@ -67,13 +68,11 @@ fn what_mujoco_refuses_does_not_load_without_a_word() {
 fn what_mujoco_loads_loads() {
     for name in [
         "b_actuatorfrc",
-        "b_attach",
         "b_body_in_default",
         "b_damping0",
         "b_euler",
         "b_exclude_world",
         "b_fit_geom",
-        "b_flex",
         "b_gravity",
         "b_joint_pos",
         "b_margin_gap",
@@ -122,6 +121,148 @@ fn what_mujoco_loads_loads() {
     }
 }
 
+/// What point 1 says of a text: its verdict and its faults.
+fn loads(text: &str) -> (Verdict, Vec<String>) {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("m.xml");
+    std::fs::write(&path, text).unwrap();
+    let one = check::model(&model::read(&path).unwrap(), None).into_iter().find(|p| p.id == 1).unwrap();
+    (one.verdict, one.faults)
+}
+
+/// A body with a hinge, one that floats, and more beside the world.
+fn scene(before: &str, body: &str, after: &str) -> String {
+    format!(
+        r#"<mujoco>{before}<worldbody><body name="a"><joint name="j"/><geom name="g" size=".1"/><site name="s"/></body>
+        <body name="b"><freejoint name="free"/><geom name="h" size=".1"/><site name="t"/></body>{body}</worldbody>{after}</mujoco>"#
+    )
+}
+
+#[test]
+fn values_that_mujoco_refuses_are_told() {
+    // Each is refused by MuJoCo 4.0.
+    for (body, word) in [
+        ("<geom type='plane' size='1 1'/>", "third size of a plane"),
+        ("<geom type='plane'/>", "third size of a plane"),
+        ("<geom size='1' condim='5'/>", "it is 1, 3, 4 or 6"),
+        ("<geom size='1' group='1.5'/>", "no whole number"),
+        ("<geom size='1' quat='1 0 0 0' euler='0 0 1'/>", "says how it is turned"),
+        ("<body><geom size='.1' mass='-1'/></body>", "is negative"),
+        ("<body><joint axis='0 0 0'/><geom size='.1'/></body>", "its axis is 0"),
+        ("<body><joint type='ball' range='1 10'/><geom size='.1'/></body>", "begins at 0"),
+        ("<body><joint springdamper='0 1'/><geom size='.1'/></body>", "springdamper"),
+        ("<body><joint actuatorfrclimited='true'/><geom size='.1'/></body>", "actuatorfrcrange"),
+        ("<body><joint type='ball'/><joint/><geom size='.1'/></body>", "behind a ball"),
+        (
+            "<body><joint/><joint/><joint/><joint/><joint/><joint/><joint/><geom size='.1'/></body>",
+            "more than 6 degrees of freedom",
+        ),
+        ("<frame><joint/></frame>", "the world has no joints"),
+        ("<camera fovy='180'/>", "below 180"),
+        ("<site size='-1'/>", "must be positive"),
+        ("<site type='plane'/>", "not for sites"),
+        ("<site fromto='0 0 0 0 0 1' type='sphere'/>", "fromto is not for"),
+    ] {
+        let (verdict, faults) = loads(&scene("", body, ""));
+        assert!(verdict == Verdict::Fail && faults.iter().any(|f| f.contains(word)), "{body}: {faults:?}");
+    }
+    for (before, word) in [
+        ("<asset><texture name='t'/></asset>", "neither file nor builtin"),
+        ("<asset><texture type='2d' name='t' builtin='flat' width='4'/></asset>", "width and height"),
+        ("<asset><texture builtin='flat' width='4' height='4'/></asset>", "has no name"),
+        ("<asset><material/></asset>", "has no name"),
+        ("<asset><hfield name='h' nrow='1' ncol='2' size='1 1 1 1'/></asset>", "2 or more"),
+        ("<asset><hfield name='h' nrow='2' ncol='2' size='1 1 0 1'/></asset>", "must be positive"),
+        ("<asset><model name='m' file='gone.xml'/></asset>", "gone.xml: there is no such file"),
+        ("<statistic extent='0'/>", "extent must be positive"),
+    ] {
+        let (verdict, faults) = loads(&scene(before, "", ""));
+        assert!(verdict == Verdict::Fail && faults.iter().any(|f| f.contains(word)), "{before}: {faults:?}");
+    }
+    for (after, word) in [
+        ("<equality><weld/></equality>", "ties nothing"),
+        ("<equality><connect body1='a' body2='b'/></equality>", "ties nothing"),
+        ("<equality><weld body1='a' body2='a'/></equality>", "ties a body to itself"),
+        ("<equality><joint joint1='free'/></equality>", "neither a hinge nor a slide"),
+        ("<equality><joint joint1='j' joint2='j'/></equality>", "ties a joint to itself"),
+        ("<actuator><motor joint='j' ctrllimited='true'/></actuator>", "no ctrlrange that goes up"),
+        ("<actuator><motor joint='j' forcelimited='true' forcerange='1 0'/></actuator>", "no forcerange that goes up"),
+        ("<actuator><damper joint='j' kv='1'/></actuator>", "no ctrlrange that goes up"),
+        ("<actuator><motor cranksite='s'/></actuator>", "slidersite"),
+        ("<tendon><fixed/></tendon>", "its path is empty"),
+        ("<tendon><fixed><joint joint='j'/></fixed></tendon>", "needs the attribute \"coef\""),
+        ("<tendon><fixed><joint joint='free' coef='1'/></fixed></tendon>", "neither a hinge nor a slide"),
+        ("<tendon><spatial><site site='s'/></spatial></tendon>", "two sites or geoms"),
+        ("<sensor><jointpos joint='free'/></sensor>", "neither a hinge nor a slide"),
+        ("<sensor><ballquat joint='j'/></sensor>", "is no ball"),
+        ("<sensor><jointlimitpos joint='j'/></sensor>", "has no limits"),
+        ("<sensor><jointpos joint='j' noise='-1'/></sensor>", "must not be negative"),
+        ("<keyframe><key ctrl='0'/></keyframe>", "ctrl has 1 numbers, the model 0"),
+    ] {
+        let (verdict, faults) = loads(&scene("", "", after));
+        assert!(verdict == Verdict::Fail && faults.iter().any(|f| f.contains(word)), "{after}: {faults:?}");
+    }
+}
+
+#[test]
+fn values_that_mujoco_takes_pass() {
+    for (before, body, after) in [
+        ("", "<geom type='plane' size='0 0 .1'/>", ""),
+        ("", "<geom size='1' condim='4' group=' 1 ' priority='+1'/>", ""),
+        (
+            "",
+            "<body><joint/><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/><geom size='.1' mass='-1'/></body>",
+            "",
+        ),
+        ("", "<body><joint type='ball' axis='0 0 0'/><geom size='.1'/></body>", ""),
+        ("", "<body><joint/><joint type='ball'/><geom size='.1'/></body>", ""),
+        ("", "<site type='box' size='1'/>", ""),
+        ("<asset><texture type='skybox' builtin='gradient' width='4'/></asset>", "", ""),
+        ("<asset><texture name='t' builtin='flat' width='4'/></asset>", "", ""),
+        // All actuators share their defaults.
+        (
+            "<default><general ctrlrange='-1 1'/></default>",
+            "",
+            "<actuator><motor joint='j' ctrllimited='true'/></actuator>",
+        ),
+        ("", "", "<actuator><motor joint='j' ctrlrange='1 0'/></actuator>"),
+        ("", "", "<equality><connect site1='s' site2='t'/></equality>"),
+        // The rest is the model's own pose.
+        ("", "", "<keyframe><key qpos='0' qvel='0 0'/></keyframe>"),
+        (
+            "<asset><mesh name='m' builtin='plate' params='4 4'/></asset>",
+            "<geom type='mesh' mesh='m' contype='0' conaffinity='0'/>",
+            "",
+        ),
+    ] {
+        let (verdict, faults) = loads(&scene(before, body, after));
+        assert_eq!(verdict, Verdict::Pass, "{before}{body}{after}: {faults:?}");
+    }
+}
+
+#[test]
+fn bodies_beside_the_world_are_lost_and_not_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("m.xml");
+    std::fs::write(&path, "<mujoco>\n<body name=\"lost\"><geom size=\"1\"/></body></mujoco>").unwrap();
+    let points = check::model(&model::read(&path).unwrap(), None);
+    assert_eq!(points[0].verdict, Verdict::Pass, "{points:?}");
+    let four = points.iter().find(|p| p.id == 4).unwrap();
+    assert!(four.faults.iter().any(|f| f.starts_with("line 2, <body name=\"lost\">: stands outside")), "{four:?}");
+}
+
+#[test]
+fn an_attached_model_brings_its_own_materials() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("child.xml"), "<mujoco><asset><material name=\"oak\"/></asset></mujoco>").unwrap();
+    let path = dir.path().join("m.xml");
+    let text = r#"<mujoco><asset><model name="c" file="child.xml"/></asset><worldbody>
+        <geom size="1" material="oak"/><attach model="c" prefix=""/></worldbody></mujoco>"#;
+    std::fs::write(&path, text).unwrap();
+    let points = check::model(&model::read(&path).unwrap(), None);
+    assert_eq!(points[0].verdict, Verdict::NotJudged, "{points:?}");
+}
+
 #[test]
 fn includes_are_read_where_mujoco_reads_them() {
     for name in ["inside.xml", "nested_beside.xml", "scene/outside.xml"] {
@@ -135,6 +276,12 @@ fn includes_are_read_where_mujoco_reads_them() {
     let path = dir.path().join("m.xml");
     std::fs::write(&path, "<mujoco>\n<include file=\"gone.xml\"/>\n</mujoco>").unwrap();
     let points = check::model(&model::read(&path).unwrap(), None);
+    // What cannot be read without the missing file says so.
+    let other = dir.path().join("other.xml");
+    std::fs::write(&other, "<mujoco><include file=\"gone.xml\"/><worldbody><geom class=\"c\"/></worldbody></mujoco>")
+        .unwrap();
+    let error = model::read(&other).unwrap_err().to_string();
+    assert!(error.contains("includes gone.xml, which is not there") && error.contains("class \"c\""), "{error}");
     let fault = "line 2, <include>: includes gone.xml, which is not there";
     assert!(points[0].faults.iter().any(|f| f.contains(fault)), "{points:?}");
     assert_eq!(points[1].verdict, Verdict::NotJudged);
@@ -185,8 +332,11 @@ fn what_was_not_read_is_not_judged() {
         let out = paws(&["check", name, "--json"], &file("12_mjcf"));
         assert_eq!(out.status.code(), Some(1), "{name}: {}", stderr(&out));
         let all: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
-        let two = all[0]["points"].as_array().unwrap().iter().find(|p| p["id"] == 2).unwrap();
-        assert_eq!(two["verdict"], "not judged", "{name}");
+        // Nor whether it loads: what is not read may be refused.
+        for id in [1, 2] {
+            let point = all[0]["points"].as_array().unwrap().iter().find(|p| p["id"] == id).unwrap();
+            assert_eq!(point["verdict"], "not judged", "{name}");
+        }
         let out = paws(&["check", name], &file("12_mjcf"));
         assert!(String::from_utf8_lossy(&out.stdout).contains('?'), "{name}");
     }
