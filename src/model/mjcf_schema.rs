@@ -148,7 +148,7 @@ fn element(model: &Path, e: &Element, row: &Row, faults: &mut Vec<String>) {
     for name in row.attributes.iter().filter(|(n, a)| a.required && e.get(n).is_none()).map(|(n, _)| n) {
         fault(format!("<{}> needs the attribute \"{name}\"", brief(&e.name)));
     }
-    let given = |way: &&str| row.attributes.contains_key(*way) && e.get(*way).is_some_and(|v| !v.trim().is_empty());
+    let given = |way: &&str| row.attributes.contains_key(*way) && e.get(way).is_some_and(|v| !v.trim().is_empty());
     if WAYS.iter().copied().filter(given).count() > 1 {
         fault(format!("more than one of {} says how it is turned", WAYS.join(", ")));
     }

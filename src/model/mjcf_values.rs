@@ -124,7 +124,7 @@ fn coupled(e: &Element, joints: &Joints) -> Option<String> {
 fn tied(e: &Element) -> Option<String> {
     let given = |attribute: &str| e.get(attribute).is_some_and(|v| !v.trim().is_empty());
     let bodies = given("body1") && (e.name == "weld" || given("anchor"));
-    if !bodies && !(given("site1") && given("site2")) {
+    if !(bodies || given("site1") && given("site2")) {
         let anchored = if e.name == "weld" { "" } else { " and anchor" };
         return Some(format!("ties nothing: write body1{anchored}, or site1 and site2"));
     }
