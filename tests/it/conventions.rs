@@ -138,7 +138,8 @@ fn every_wrong_convention_is_named() {
 #[test]
 fn right_recordings_raise_no_alarm() {
     let shift: fn(&mut Recording) = |r| shift_hands(r, 2);
-    let harmless: [(&str, fn(&mut Recording)); 5] = [
+    type Change = (&'static str, fn(&mut Recording));
+    let harmless: [Change; 5] = [
         ("as it is", |_| {}),
         ("a focal length 5 % off", |r| {
             r.camera.fx *= 1.05;

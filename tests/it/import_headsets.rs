@@ -77,7 +77,7 @@ fn write_hololens(root: &Path) {
     write(&root.join("20240101_pv.txt"), pv);
     write(&root.join("20240101_head_hand_eye.csv"), eyes);
     write(&root.join("Depth Long Throw_rig2world.txt"), rigs);
-    write(&root.join("Depth Long Throw_extrinsics.txt"), row_by_row(&camera_from_rig.to_homogeneous())[1..].to_owned());
+    write(&root.join("Depth Long Throw_extrinsics.txt"), &row_by_row(&camera_from_rig.to_homogeneous())[1..]);
     let table: Vec<u8> = (0..c.width * c.height)
         .flat_map(|k| ray(k).normalize().iter().flat_map(|x| (*x as f32).to_le_bytes()).collect::<Vec<u8>>())
         .collect();

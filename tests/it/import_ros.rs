@@ -128,7 +128,7 @@ impl Cdr {
     }
 
     fn number<const N: usize>(mut self, mut little: [u8; N]) -> Self {
-        while (self.bytes.len() - 4) % N != 0 {
+        while !(self.bytes.len() - 4).is_multiple_of(N) {
             self.bytes.push(0);
         }
         if self.is_big {
