@@ -187,6 +187,15 @@ mod tests {
     }
 
     #[test]
+    fn each_front_is_tried_once_and_that_of_the_most_trusted_clip_first() {
+        let clips = [0.0, 0.02, 0.3, 0.31].map(|front| clip(front, 0.0, 0.2, true));
+        let others = |trusted: &[usize]| other_fronts(&clips, trusted, &Config::default());
+        assert_eq!(others(&[0, 1, 2, 3]), [2]);
+        assert_eq!(others(&[3, 1, 2, 0]), [1]);
+        assert!(others(&[0, 1]).is_empty() && others(&[]).is_empty());
+    }
+
+    #[test]
     fn a_clip_that_is_trusted_most_but_has_no_answer_gives_no_front() {
         let mut clips = [clip(0.0, 0.0, 0.4, true), clip(0.0, 0.0, 0.2, true)];
         let best = |clips: &[ClipResult]| by_trust(clips, &[0, 1], &Config::default()).first().copied();
