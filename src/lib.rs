@@ -38,6 +38,7 @@ pub mod recording;
 
 pub mod import;
 
+pub mod look;
 pub mod twin;
 pub mod vlm;
 

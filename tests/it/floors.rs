@@ -8,7 +8,7 @@ const FLOORS: [&[&str]; 17] = [
     &["json", "math"],
     &["articulation", "vlm"],
     &["recording", "config"],
-    &["twin", "import"],
+    &["twin", "look", "import"],
     &["model"],
     &["hands", "synth"],
     &["localization"],
