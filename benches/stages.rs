@@ -117,7 +117,6 @@ fn view_select(c: &mut Criterion) {
             frames,
             clips: Vec::new(),
             hands: Vec::new(),
-            contact_known: true,
             labels: Default::default(),
             reconstruction: Vec::new(),
             depth_factors: DepthFactors::default(),

@@ -30,7 +30,7 @@ use paws_twin::hands::{self, Trajectory};
 use paws_twin::inference::observed_range;
 use paws_twin::json;
 use paws_twin::math::{Vector, stats};
-use paws_twin::recording::{Recording, narration};
+use paws_twin::recording::{AtWork, Recording, narration};
 use paws_twin::report::table::aligned;
 use paws_twin::synth::kitchen::OpenPart;
 use paws_twin::synth::{Changes, Options, Recorded, Tier};
@@ -337,6 +337,7 @@ fn play(args: &Args, tier: Tier, number: u64, noise_m: Option<f64>, config: &Con
     let entries: Vec<Entry> = parts.iter().filter(|p| opened.contains(p.id.as_str())).map(entry).collect();
     let scene = format!("{} {seed}", tier.name());
     let twin = built(scene.clone(), entries.clone(), &config.fitting)?;
+    let holds = hands::contact::holds(&recording, &AtWork::of(&recording), &config.hands)?;
     let shown: Vec<Vec<Shown>> = twin
         .furniture
         .iter()
@@ -345,9 +346,9 @@ fn play(args: &Args, tier: Tier, number: u64, noise_m: Option<f64>, config: &Con
                 let truth = truth.clips.get(clip)?.as_ref()?;
                 (truth.joint == f.part.id).then_some(truth.moved)
             };
-            let clips = recording.clips.iter().filter_map(|clip| {
+            let clips = recording.clips.iter().zip(&holds).filter_map(|(clip, hold)| {
                 let moved = of_part(&clip.clip)?;
-                let hand = hands::trajectory(&recording, clip, &narration::read(clip), &config.hands);
+                let hand = hands::trajectory(&recording, clip, &narration::read(clip), hold.as_ref(), &config.hands);
                 let trajectory = hand.found()?.clone();
                 Some(Shown { clip: clip.clip.clone(), trajectory, moved })
             });

@@ -114,8 +114,12 @@ block! {
         gate_p_value: f64 = 0.05, "share", "B.1";
         /// Rejections in a row after which the filter starts again (0 = never).
         restart_after: usize = 3, "samples", "ours";
-        /// Use the detector's contact flags; false takes every sample of a clip.
+        /// Tell when a hand holds something; false takes every sample of a clip.
         use_contact: bool = true, "-", "A.2";
+        /// Tell it from depth around the hand, too, with flags as evidence; false believes the flags alone.
+        contact_from_depth: bool = true, "-", "ours";
+        /// Frames with a hand whose depth is looked at for it: one in this time, a fraction of what reaching takes.
+        contact_every_secs: f64 = 0.15, "s", "ours";
         /// Where no sample is flagged, all of the clip count if the narration names the furniture that they move.
         contact_from_words: bool = true, "-", "ours";
         /// Contact that begins inside a narration is followed beyond its bounds by at most this (0 = not at all).
@@ -396,6 +400,7 @@ impl Config {
     #[must_use]
     pub fn paper() -> Self {
         let mut config = Self { method: Method::Paper, ..Self::default() };
+        config.hands.contact_from_depth = false;
         config.hands.contact_from_words = false;
         config.hands.restart_after = 0;
         config.hands.min_samples = 3;

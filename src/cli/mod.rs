@@ -116,12 +116,6 @@ impl Opening {
     /// Opens a recording, and says what it leaves open.
     fn open(self, dir: &Path) -> crate::error::Result<Recording> {
         let recording = if self.follow_links { Recording::open_following_links(dir) } else { Recording::open(dir) }?;
-        if !recording.contact_known {
-            eprintln!(
-                "{}: no hand says whether it is in contact (\"contact\"): all samples of a clip count as in contact",
-                shown(dir)
-            );
-        }
         let repeated = recording.repeated_times();
         if let Some(first) = repeated.first() {
             eprintln!(

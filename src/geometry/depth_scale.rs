@@ -355,7 +355,6 @@ mod tests {
             frames,
             clips: Vec::new(),
             hands: Vec::new(),
-            contact_known: true,
             labels: BTreeMap::new(),
             reconstruction: Vec::new(),
             depth_factors: DepthFactors::default(),

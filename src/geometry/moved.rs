@@ -315,7 +315,6 @@ mod tests {
             frames: (0..80).map(frame).collect(),
             clips: clips.to_vec(),
             hands: Vec::new(),
-            contact_known: true,
             labels: Default::default(),
             reconstruction: Vec::new(),
             depth_factors: DepthFactors::default(),

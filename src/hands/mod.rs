@@ -1,5 +1,7 @@
 //! Dynamic interaction: fingertips to a contact-trimmed, smoothed trajectory (§3.1, §A.2).
 
+pub mod contact;
+
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -122,18 +124,21 @@ impl Trajectory {
     }
 }
 
-/// Extracts the trajectory of the hand that does the work in a clip.
+/// Extracts the trajectory of the hand that does the work in a clip: the samples of `hold`, where it is known
+/// ([`contact::holds`]), else the stretch that a detector's flags tell.
 #[must_use]
 pub fn trajectory(
     recording: &Recording,
     clip: &Clip,
     reading: &Reading,
+    hold: Option<&contact::Hold>,
     config: &config::Hands,
 ) -> Outcome<Trajectory> {
     let samples_of = |side: Side, from: usize, to: usize| -> Vec<&HandSample> {
         recording.hands_in(from, to).iter().filter(|s| s.side == side).collect()
     };
-    let use_contact = config.use_contact && recording.contact_known;
+    let flagged = recording.contact_known();
+    let use_contact = config.use_contact && flagged;
     let [from, to] = widened(recording, clip, config.widen_secs);
     let mut in_clip = 0;
     let best = [Side::Right, Side::Left]
@@ -141,6 +146,10 @@ pub fn trajectory(
         .map(|side| {
             let samples = samples_of(side, clip.start_frame, clip.end_frame);
             in_clip += samples.len();
+            if let Some(hold) = hold {
+                let held = if side == hold.side { samples_of(side, hold.frames[0], hold.frames[1]) } else { Vec::new() };
+                return (held.len(), side, held);
+            }
             if !use_contact {
                 return (samples.len(), side, samples);
             }
@@ -170,7 +179,7 @@ pub fn trajectory(
     // A blink of the detector; a hand takes as long to reach a handle.
     const SEEN_SECS: f64 = 0.35;
     // Without a flag the samples are the narration's, which knows neither end.
-    let ends_seen = if !recording.contact_known || (use_contact && score == 0) {
+    let ends_seen = if hold.is_none() && (!flagged || (use_contact && score == 0)) {
         [false; 2]
     } else {
         let time = |s: &HandSample| recording.frames[s.frame].timestamp_secs;
@@ -227,7 +236,7 @@ pub fn filter(config: &config::Hands) -> Filter {
 }
 
 fn flags(samples: &[&HandSample]) -> Vec<bool> {
-    samples.iter().map(|s| s.contact).collect()
+    samples.iter().map(|s| s.contact == Some(true)).collect()
 }
 
 /// The clip's bounds moved outward by at most `secs`, without entering another narrated interaction.
@@ -269,7 +278,7 @@ fn grown<'a>(recording: &Recording, around: &[&'a HandSample], first: usize, las
             if (time(around[i]) - time(around[last])).abs() > GAP_SECS {
                 break;
             }
-            sum += if around[i].contact { 1 } else { -1 };
+            sum += if around[i].contact == Some(true) { 1 } else { -1 };
             if sum > best_sum {
                 (best, best_sum) = (i, sum);
             }
@@ -336,7 +345,7 @@ mod tests {
             files: Default::default(),
         });
         let tip = |i: usize| Point::new(0.0, 0.05 * i as f64, 0.6);
-        let hand = |i: usize| HandSample { frame: i, side: Side::Left, contact: false, tips: [tip(i); 3] };
+        let hand = |i: usize| HandSample { frame: i, side: Side::Left, contact: Some(false), tips: [tip(i); 3], joints: None };
         let clip = |narration: &str| Clip {
             clip: "c".to_owned(),
             start_frame: 1,
@@ -352,14 +361,13 @@ mod tests {
             frames: frames.collect(),
             clips: Vec::new(),
             hands: (0..6).map(hand).collect(),
-            contact_known: true,
             labels: Default::default(),
             reconstruction: Vec::new(),
             depth_factors: Default::default(),
         };
         let follow = |narration: &str, config: &config::Hands| {
             let clip = clip(narration);
-            trajectory(&recording, &clip, &crate::recording::narration::read(&clip), config)
+            trajectory(&recording, &clip, &crate::recording::narration::read(&clip), None, config)
         };
         let config = config::Hands::default();
         let found = follow("open the drawer", &config);

@@ -10,6 +10,7 @@ use crate::geometry::Rect;
 use crate::geometry::outline::Stop;
 use crate::geometry::segments::LiftedSegment;
 use crate::geometry::{Face, LineTrack, ManhattanFrame, candidates, face, moved, outline, sights, tracks};
+use crate::hands::contact::Hold;
 use crate::hands::{self, Trajectory};
 use crate::inference;
 use crate::localization::{self, Footage, Region, views};
@@ -30,12 +31,18 @@ pub(super) struct Followed {
     pub(super) open: Vec<usize>,
 }
 
-pub(super) fn follow(recording: &Recording, clip: &Clip, at_work: &AtWork, config: &Config) -> Followed {
+pub(super) fn follow(
+    recording: &Recording,
+    clip: &Clip,
+    hold: Option<&Hold>,
+    at_work: &AtWork,
+    config: &Config,
+) -> Followed {
     let reading = narration::read(clip);
     let hand = if reading.moves_joint == Some(false) {
         Outcome::Abstained(format!("the narration \"{}\" moves no door or drawer", clip.narration))
     } else {
-        hands::trajectory(recording, clip, &reading, &config.hands)
+        hands::trajectory(recording, clip, &reading, hold, &config.hands)
     };
     let (closed, open) = hand.found().map_or_else(Default::default, |t| {
         let open = moved::open_frames(recording, clip, t).into_iter().map(|f| f.frame).collect();

@@ -18,7 +18,7 @@ use crate::error::{Error, Result};
 use crate::geometry::Rect;
 use crate::geometry::segments::{LiftedSegment, LineDetector, lift};
 use crate::geometry::{AxisCandidate, Face, LineTrack, ManhattanFrame, depth_scale, manhattan, tracks};
-use crate::hands::Trajectory;
+use crate::hands::{Trajectory, contact};
 use crate::inference::{ClipJoint, Uncertainty};
 use crate::localization::{Footage, Region, views};
 use crate::math::Point;
@@ -233,8 +233,14 @@ pub fn infer(
 
     // Hands, clip by clip; they tell which frames are needed.
     let at_work = AtWork::of(recording);
-    let followed: Vec<clip::Followed> =
-        recording.clips.par_iter().map(|clip| clip::follow(recording, clip, &at_work, config)).collect();
+    start("following hands", 1);
+    let holds = contact::holds(recording, &at_work, &config.hands)?;
+    let followed: Vec<clip::Followed> = recording
+        .clips
+        .par_iter()
+        .zip(&holds)
+        .map(|(clip, hold)| clip::follow(recording, clip, hold.as_ref(), &at_work, config))
+        .collect();
 
     let mut looks = Looks::default();
     let look = |looks: &mut Looks, frames: Vec<usize>, lines: bool| -> Result<()> {

@@ -74,7 +74,6 @@ mod tests {
             frames: (0..10).map(frame).collect(),
             clips: vec![clip("a", 2, 5), clip("b", 4, 7), clip("remark", 9, 9)],
             hands: Vec::new(),
-            contact_known: true,
             labels: Default::default(),
             reconstruction: Vec::new(),
             depth_factors: Default::default(),

@@ -138,10 +138,13 @@ pub struct HandSample {
     pub frame: usize,
     /// Which hand.
     pub side: Side,
-    /// The contact detector's opinion.
-    pub contact: bool,
+    /// A contact detector's opinion; `None` where nobody was asked.
+    pub contact: Option<bool>,
     /// Thumb, index and middle fingertips in the world.
     pub tips: [Point; 3],
+    /// All 21 joints in the world, metres, where the tracker gives them: the wrist, then from the thumb on four of each
+    /// finger from its root to its tip. Single precision: they only tell which pixels are hand.
+    pub joints: Option<[[f32; 3]; 21]>,
 }
 
 impl HandSample {
@@ -149,6 +152,26 @@ impl HandSample {
     #[must_use]
     pub fn grasp(&self) -> Point {
         Point::from((self.tips[0].coords + self.tips[1].coords + self.tips[2].coords) / 3.0)
+    }
+
+    /// The joints that are known: all, or the three tips.
+    #[must_use]
+    pub fn skeleton(&self) -> Vec<Point> {
+        match &self.joints {
+            Some(joints) => joints.iter().map(|p| Point::from(p.map(f64::from))).collect(),
+            None => self.tips.to_vec(),
+        }
+    }
+
+    /// Pairs of joints with a bone between them; of three tips alone, each tip twice.
+    #[must_use]
+    pub fn bones(&self) -> Vec<[Point; 2]> {
+        let at = self.skeleton();
+        if self.joints.is_none() {
+            return at.iter().map(|p| [*p, *p]).collect();
+        }
+        // The first joint of a finger hangs on the wrist.
+        (1..at.len()).map(|i| [at[if i % 4 == 1 { 0 } else { i - 1 }], at[i]]).collect()
     }
 }
 
@@ -167,8 +190,6 @@ pub struct Recording {
     pub clips: Vec<Clip>,
     /// Hands, by frame.
     pub hands: Vec<HandSample>,
-    /// Whether a detector said which hands are in contact; where none did, all samples of a clip count.
-    pub contact_known: bool,
     /// Mask class to name.
     pub labels: BTreeMap<u8, String>,
     /// Points of a static reconstruction (`reconstruction.ply` or `.obj`), world frame; empty where there is none.
@@ -225,6 +246,12 @@ impl Recording {
     /// As [`Self::open`].
     pub fn open_following_links(dir: &std::path::Path) -> Result<Self> {
         read::open(dir, true, true)
+    }
+
+    /// Whether a detector said of any hand whether it is in contact.
+    #[must_use]
+    pub fn contact_known(&self) -> bool {
+        self.hands.iter().any(|h| h.contact.is_some())
     }
 
     /// The world's up direction (+Z by convention; good to about a degree).

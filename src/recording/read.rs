@@ -129,8 +129,8 @@ pub(super) fn open(dir: &Path, follow_links: bool, judge: bool) -> Result<Record
     let camera = check_camera(&cameras, &mut faults);
     let frames = frames(&folder, &cameras, &mut faults);
     check_clips(&clips.clips, frames.len(), &mut faults);
-    let Hands { samples: hands, contact_known } = hands(dir, frames.len(), &mut faults)?;
-    check_hands(&hands, contact_known, &frames, judge, &mut faults);
+    let hands = hands(dir, frames.len(), &mut faults)?;
+    check_hands(&hands, &frames, judge, &mut faults);
     let labels = labels(dir)?;
     let reconstruction = reconstruction::read(dir)?;
     faults.finish(dir)?;
@@ -147,7 +147,6 @@ pub(super) fn open(dir: &Path, follow_links: bool, judge: bool) -> Result<Record
         frames,
         clips: clips.clips,
         hands,
-        contact_known,
         labels,
         reconstruction,
         depth_factors: super::DepthFactors::default(),
@@ -322,14 +321,7 @@ fn check_clips(clips: &[Clip], frames: usize, faults: &mut Faults) {
     }
 }
 
-/// All hands of a recording.
-struct Hands {
-    samples: Vec<HandSample>,
-    /// Whether any of them says whether it is in contact.
-    contact_known: bool,
-}
-
-fn hands(dir: &Path, frames: usize, faults: &mut Faults) -> Result<Hands> {
+fn hands(dir: &Path, frames: usize, faults: &mut Faults) -> Result<Vec<HandSample>> {
     let full = dir.join("hands.json");
     let tips = dir.join("fingertips.csv");
     let mut hands = if full.is_file() {
@@ -345,7 +337,7 @@ fn hands(dir: &Path, frames: usize, faults: &mut Faults) -> Result<Hands> {
         });
     };
     let name = if full.is_file() { "hands.json" } else { "fingertips.csv" };
-    hands.samples.retain(|s| {
+    hands.retain(|s| {
         let inside = s.frame < frames;
         if !inside {
             faults.add("hand frame", format!("{name}: frame {}: the video has {frames} frames", s.frame));
@@ -357,14 +349,13 @@ fn hands(dir: &Path, frames: usize, faults: &mut Faults) -> Result<Hands> {
         }
         inside && finite
     });
-    hands.samples.sort_by_key(|s| (s.frame, s.side));
+    hands.sort_by_key(|s| (s.frame, s.side));
     Ok(hands)
 }
 
-fn hands_json(path: &Path, faults: &mut Faults) -> Result<Hands> {
+fn hands_json(path: &Path, faults: &mut Faults) -> Result<Vec<HandSample>> {
     let file: HandsFile = json::read(path)?;
     let mut samples = Vec::new();
-    let mut contact_known = false;
     for frame in file.frames {
         for hand in frame.hands {
             let Some(tips) = TIP_JOINTS.iter().map(|&j| hand.joints_world.get(j)).collect::<Option<Vec<_>>>() else {
@@ -373,12 +364,21 @@ fn hands_json(path: &Path, faults: &mut Faults) -> Result<Hands> {
                 continue;
             };
             let tips = [0, 1, 2].map(|i| Point::from(*tips[i]));
-            contact_known |= hand.contact.is_some();
-            let contact = hand.contact.unwrap_or(false);
-            samples.push(HandSample { frame: frame.frame, side: hand.side, contact, tips });
+            let mut joints = [[0f32; 3]; 21];
+            for (joint, read) in joints.iter_mut().zip(&hand.joints_world) {
+                *joint = read.map(|x| x as f32);
+            }
+            let all = hand.joints_world.len() == joints.len() && joints.iter().flatten().all(|x| x.is_finite());
+            samples.push(HandSample {
+                frame: frame.frame,
+                side: hand.side,
+                contact: hand.contact,
+                tips,
+                joints: all.then_some(joints),
+            });
         }
     }
-    Ok(Hands { samples, contact_known })
+    Ok(samples)
 }
 
 /// Reads a line of at most [`MAX_LINE_BYTES`]; `None` at the end of the file.
@@ -396,7 +396,7 @@ pub(super) fn bounded_line(reader: &mut impl BufRead, path: &Path, number: usize
     Ok(Some(text.trim_end_matches(['\n', '\r']).to_owned()))
 }
 
-fn fingertips_csv(path: &Path) -> Result<Hands> {
+fn fingertips_csv(path: &Path) -> Result<Vec<HandSample>> {
     const TIPS: [[&str; 3]; 3] =
         [["thumb_x", "thumb_y", "thumb_z"], ["index_x", "index_y", "index_z"], ["middle_x", "middle_y", "middle_z"]];
     let file = File::open(path).map_err(|e| Error::io(path, &e))?;
@@ -418,7 +418,6 @@ fn fingertips_csv(path: &Path) -> Result<Hands> {
         }
     }
     let mut samples = Vec::new();
-    let mut contact_known = false;
     let mut number = 1;
     loop {
         number += 1;
@@ -452,21 +451,21 @@ fn fingertips_csv(path: &Path) -> Result<Hands> {
             *tip = Point::new(number_at(columns[0])?, number_at(columns[1])?, number_at(columns[2])?);
         }
         let said = contact.map(|column| cells[column]).filter(|cell| !cell.is_empty());
-        contact_known |= said.is_some();
         let contact = match said {
-            Some("1" | "true" | "True") => true,
-            None | Some("0" | "false" | "False") => false,
+            Some("1" | "true" | "True") => Some(true),
+            Some("0" | "false" | "False") => Some(false),
+            None => None,
             Some(other) => {
                 return Err(Error::format(path, place(), format!("column contact: \"{other}\" is not 0 or 1")));
             }
         };
-        samples.push(HandSample { frame: index, side, contact, tips });
+        samples.push(HandSample { frame: index, side, contact, tips, joints: None });
     }
-    Ok(Hands { samples, contact_known })
+    Ok(samples)
 }
 
 /// A hand's own size tells the unit of the file, whatever the scene is like.
-fn check_hands(hands: &[HandSample], contact_known: bool, frames: &[Frame], judge: bool, faults: &mut Faults) {
+fn check_hands(hands: &[HandSample], frames: &[Frame], judge: bool, faults: &mut Faults) {
     if hands.is_empty() {
         faults.add("hands", "hands.json / fingertips.csv: no hand in any frame".to_owned());
         return;
@@ -494,14 +493,6 @@ fn check_hands(hands: &[HandSample], contact_known: bool, frames: &[Frame], judg
                 "hands are {distance:.2} from the camera (median), an arm reaches 0.2 to 1.2 m; hands and camera poses \
                  must share one world frame and one unit (metres); paws import --check looks for the cause"
             ),
-        );
-    }
-    if contact_known && !hands.iter().any(|s| s.contact) {
-        faults.add(
-            "contact",
-            "hands: no sample is in contact; run a contact detector and fill \"contact\", or leave \"contact\" out of all \
-             hands where nobody knows: then all samples of a clip count, as with hands.use_contact = false in the config"
-                .to_owned(),
         );
     }
 }

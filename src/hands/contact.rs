@@ -1,0 +1,531 @@
+//! When a hand holds something (§A.2 takes a detector's word for it): from the depth that is seen around the fingertips, the
+//! furniture before and after, and a detector's flags as far as they agree with these.
+//!
+//! A hand that holds a part has the part's surface at its fingertips in every frame; one that reaches or withdraws has air
+//! there. How far the surface is from the fingertips, and how much that varies, is measured in each recording.
+
+use rayon::prelude::*;
+
+use super::widened;
+use crate::config;
+use crate::error::Result;
+use crate::math::{Point, stats};
+use crate::recording::{AtWork, Clip, Frame, Grid, HAND_CLASS, HandSample, Recording, Side, narration};
+
+/// The stretch of a clip in which a hand holds something.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Hold {
+    /// Which hand.
+    pub side: Side,
+    /// First and last frame, included; in both the hand was seen.
+    pub frames: [usize; 2],
+}
+
+/// Nothing is looked for farther from the fingertips, metres: twice a hand's breadth and more is not contact.
+const REACH_M: f64 = 0.3;
+/// Distances of a hand in the air fall off with this, metres: about half of the way that a hand reaches.
+const FREE_M: f64 = 0.3;
+/// Share of the samples of a hold of which the distance says nothing: hands that are placed wrongly.
+const ASTRAY: f64 = 0.1;
+/// One sample says no more than this for or against contact, nats: its neighbours have the same error.
+const SAYS_AT_MOST: f64 = 3.0;
+/// Still frames before and after the clip that are looked at, and how far away they may be.
+const STILL_FRAMES: usize = 3;
+const STILL_WITHIN_SECS: f64 = 4.0;
+/// No recording knows distances better than this, metres.
+const LEAST_STD_M: f64 = 0.01;
+
+/// For each clip the stretch in which a hand holds something; `None` where the narration moves nothing, no hand was seen or
+/// nothing speaks for contact.
+///
+/// # Errors
+/// Images that cannot be decoded.
+pub fn holds(recording: &Recording, at_work: &AtWork, config: &config::Hands) -> Result<Vec<Option<Hold>>> {
+    if !config.use_contact || !config.contact_from_depth {
+        return Ok(vec![None; recording.clips.len()]);
+    }
+    let tracks: Vec<Vec<Track>> = recording
+        .clips
+        .par_iter()
+        .map(|clip| match narration::read(clip).moves_joint {
+            Some(false) => Ok(Vec::new()),
+            _ => clip_tracks(recording, clip, at_work, config),
+        })
+        .collect::<Result<_>>()?;
+    let mut widths = Widths::default();
+    let mut spans = spans(&tracks, &widths, &Flags::default());
+    // Widths from what is taken for contact, contact from the widths: it settles at once, as the middle of a hold is certain.
+    for _ in 0..2 {
+        widths = Widths::of(&tracks, &spans);
+        spans = self::spans(&tracks, &widths, &Flags::default());
+    }
+    // Geometry alone judges the flags; then they speak, too.
+    let flags = Flags::of(&tracks, &spans);
+    let spans = self::spans(&tracks, &widths, &flags);
+    Ok(tracks
+        .iter()
+        .zip(&spans)
+        .map(|(tracks, span)| {
+            let span = span.as_ref()?;
+            let track = &tracks[span.track];
+            Some(Hold { side: track.side, frames: [track.frames[span.first], track.frames[span.last]] })
+        })
+        .collect())
+}
+
+/// One hand in and around a clip.
+#[derive(Debug, Clone)]
+struct Track {
+    side: Side,
+    /// Frames in which it was seen.
+    frames: Vec<usize>,
+    /// Distance of the fingertips to the nearest surface that is not a hand, metres: now, before and after the clip.
+    /// `None` where nobody knows.
+    now: Vec<Option<f64>>,
+    before: Vec<Option<f64>>,
+    after: Vec<Option<f64>>,
+    flags: Vec<Option<bool>>,
+    /// A hold starts at this sample at the latest and ends at that one at the earliest: it overlaps the clip.
+    starts_by: usize,
+    ends_from: usize,
+}
+
+/// A stretch of a track, and how much speaks for it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Span {
+    track: usize,
+    first: usize,
+    last: usize,
+    nats: f64,
+}
+
+fn clip_tracks(recording: &Recording, clip: &Clip, at_work: &AtWork, config: &config::Hands) -> Result<Vec<Track>> {
+    let [from, to] = widened(recording, clip, config.widen_secs);
+    let around = recording.hands_in(from, to);
+    let mut tracks: Vec<Track> = Vec::new();
+    let mut places: Vec<Vec<Point>> = Vec::new();
+    for side in [Side::Right, Side::Left] {
+        let samples: Vec<&HandSample> = around.iter().filter(|s| s.side == side).collect();
+        let (Some(ends_from), Some(starts_by)) = (
+            samples.iter().position(|s| s.frame >= clip.start_frame),
+            samples.iter().rposition(|s| s.frame <= clip.end_frame),
+        ) else {
+            continue;
+        };
+        let n = samples.len();
+        places.push(samples.iter().map(|s| s.grasp()).collect());
+        tracks.push(Track {
+            side,
+            frames: samples.iter().map(|s| s.frame).collect(),
+            now: vec![None; n],
+            before: vec![None; n],
+            after: vec![None; n],
+            flags: samples.iter().map(|s| s.contact).collect(),
+            starts_by,
+            ends_from,
+        });
+    }
+    for frame in looked_at(recording, &tracks, config.contact_every_secs) {
+        let Some(view) = View::of(recording, frame)? else { continue };
+        for (track, places) in tracks.iter_mut().zip(&places) {
+            // Two rows of one frame and side are rare; the first has the distance.
+            if let Ok(i) = track.frames.binary_search(&frame) {
+                track.now[i] = view.nearest_m(&places[i]);
+            }
+        }
+    }
+    for (still, is_before) in still_frames(recording, clip, at_work) {
+        let Some(view) = View::of(recording, still)? else { continue };
+        for (track, places) in tracks.iter_mut().zip(&places) {
+            let known = if is_before { &mut track.before } else { &mut track.after };
+            for (known, place) in known.iter_mut().zip(places) {
+                let seen = view.nearest_m(place);
+                *known = match (*known, seen) {
+                    (Some(a), Some(b)) => Some(a.min(b)),
+                    (a, b) => a.or(b),
+                };
+            }
+        }
+    }
+    let time = |f: usize| recording.frames[f].timestamp_secs;
+    for track in &mut tracks {
+        let times: Vec<f64> = track.frames.iter().map(|&f| time(f)).collect();
+        track.now = between(&times, &track.now, 2.5 * config.contact_every_secs);
+    }
+    Ok(tracks)
+}
+
+/// Frames with a hand, one every so many seconds, and the first and the last.
+fn looked_at(recording: &Recording, tracks: &[Track], every_secs: f64) -> Vec<usize> {
+    let mut frames: Vec<usize> = tracks.iter().flat_map(|t| t.frames.iter().copied()).collect();
+    frames.sort_unstable();
+    frames.dedup();
+    let mut next = f64::NEG_INFINITY;
+    let last = frames.last().copied();
+    frames.retain(|&f| {
+        let time = recording.frames[f].timestamp_secs;
+        // A hair less, so that frames at just this rate are all taken.
+        let due = time >= next - 1e-6;
+        if due {
+            next = time + every_secs;
+        }
+        due || Some(f) == last
+    });
+    frames
+}
+
+/// Frames without an interaction near a clip, and whether they are before it.
+fn still_frames(recording: &Recording, clip: &Clip, at_work: &AtWork) -> Vec<(usize, bool)> {
+    let time = |f: usize| recording.frames.get(f).map_or(f64::INFINITY, |x| x.timestamp_secs);
+    let (start, end) = (time(clip.start_frame), time(clip.end_frame));
+    let still = |f: &usize| !at_work.any(*f) && recording.frames[*f].files.depth.is_some();
+    let before = (0..clip.start_frame).rev().take_while(|&f| start - time(f) <= STILL_WITHIN_SECS);
+    let after = (clip.end_frame + 1..recording.frames.len()).take_while(|&f| time(f) - end <= STILL_WITHIN_SECS);
+    let before = before.filter(still).take(STILL_FRAMES).map(|f| (f, true));
+    before.chain(after.filter(still).take(STILL_FRAMES).map(|f| (f, false))).collect()
+}
+
+/// Values at times where they are known, linear in between where the gap is no longer than `gap_secs`.
+fn between(times: &[f64], known: &[Option<f64>], gap_secs: f64) -> Vec<Option<f64>> {
+    let mut all = known.to_vec();
+    let mut last: Option<(usize, f64)> = None;
+    for (i, value) in known.iter().enumerate() {
+        let Some(value) = value else { continue };
+        if let Some((j, before)) = last {
+            let span = times[i] - times[j];
+            if span > 0.0 && span <= gap_secs {
+                for k in j + 1..i {
+                    all[k] = Some(before + (value - before) * (times[k] - times[j]) / span);
+                }
+            }
+        }
+        last = Some((i, *value));
+    }
+    all
+}
+
+/// How far the held surface is from the fingertips.
+#[derive(Debug, Clone, PartialEq)]
+struct Widths {
+    /// Over all clips, metres.
+    mean: f64,
+    /// From sample to sample.
+    std: f64,
+    /// From clip to clip: hands keep an error for a whole clip.
+    between: f64,
+    /// Each clip's own mean, drawn towards that of all as far as it rests on few samples.
+    by_clip: Vec<Option<f64>>,
+}
+
+impl Default for Widths {
+    /// Nothing measured yet: a fingertip is at the surface, estimated hands and depth are off by a few centimetres.
+    fn default() -> Self {
+        Self { mean: 0.0, std: 0.06, between: 0.0, by_clip: Vec::new() }
+    }
+}
+
+impl Widths {
+    fn of(tracks: &[Vec<Track>], spans: &[Option<Span>]) -> Self {
+        // The middle half: the hand surely holds the part there.
+        let cores: Vec<Vec<f64>> = tracks
+            .iter()
+            .zip(spans)
+            .map(|(tracks, span)| {
+                let Some(span) = span else { return Vec::new() };
+                let trim = (span.last - span.first) / 4;
+                tracks[span.track].now[span.first + trim..=span.last - trim].iter().copied().flatten().collect()
+            })
+            .collect();
+        let medians: Vec<Option<f64>> = cores.iter().map(|c| stats::median(c)).collect();
+        let all: Vec<f64> = cores.iter().flatten().copied().collect();
+        let Some(mean) = stats::median(&all) else { return Self::default() };
+        let spread = |deviations: Vec<f64>| {
+            let median = stats::median(&deviations).unwrap_or(0.0);
+            (1.4826 * median).max(LEAST_STD_M)
+        };
+        let own = cores.iter().zip(&medians).filter(|(core, _)| core.len() > 2);
+        let std = spread(own.flat_map(|(core, m)| core.iter().map(move |d| (d - m.unwrap_or(*d)).abs())).collect());
+        let between = spread(medians.iter().flatten().map(|m| (m - mean).abs()).collect());
+        let by_clip = cores
+            .iter()
+            .zip(&medians)
+            .map(|(core, median)| {
+                // Neighbouring samples share their error: about a third of them are news.
+                let news = (core.len() as f64 / 3.0).max(1.0);
+                let weight = between.powi(2) / (between.powi(2) + std.powi(2) / news);
+                median.map(|m| weight * m + (1.0 - weight) * mean)
+            })
+            .collect();
+        Self { mean, std, between, by_clip }
+    }
+
+    /// Log odds of contact for a distance to a surface in a clip.
+    fn nats(&self, clip: usize, distance_m: Option<f64>) -> f64 {
+        let Some(d) = distance_m else { return 0.0 };
+        let (mean, std) = match self.by_clip.get(clip).copied().flatten() {
+            // A third wider: the middle of a hold is steadier than its ends.
+            Some(mean) => (mean, 1.3 * self.std),
+            None => (self.mean, self.std.hypot(self.between)),
+        };
+        let free = (-d / FREE_M).exp() / FREE_M;
+        let bell = (-0.5 * ((d - mean) / std).powi(2)).exp() / (std * std::f64::consts::TAU.sqrt());
+        let held = (1.0 - ASTRAY) * bell + ASTRAY * free;
+        (held / free).ln().clamp(-SAYS_AT_MOST, SAYS_AT_MOST)
+    }
+}
+
+/// What a detector's flags are worth in this recording: log odds of contact for a flag that is set, and for one that is not.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Flags {
+    set: f64,
+    unset: f64,
+}
+
+impl Flags {
+    fn of(tracks: &[Vec<Track>], spans: &[Option<Span>]) -> Self {
+        // Before anything is seen, a flag is taken to be wrong one time in ten; that counts as much as ten samples.
+        let (mut inside, mut outside) = ([1.0, 9.0], [9.0, 1.0]);
+        for (tracks, span) in tracks.iter().zip(spans) {
+            let Some(span) = span else { continue };
+            for (i, flag) in tracks[span.track].flags.iter().enumerate() {
+                let count = if (span.first..=span.last).contains(&i) { &mut inside } else { &mut outside };
+                match flag {
+                    Some(true) => count[1] += 1.0,
+                    Some(false) => count[0] += 1.0,
+                    None => {}
+                }
+            }
+        }
+        let share = |count: [f64; 2], value: usize| count[value] / (count[0] + count[1]);
+        let nats = |value: usize| f64::ln(share(inside, value) / share(outside, value));
+        // A flag that is set more often without contact says nothing, rather than the reverse.
+        Self { set: nats(1).clamp(0.0, SAYS_AT_MOST), unset: nats(0).clamp(-SAYS_AT_MOST, 0.0) }
+    }
+
+    fn nats(&self, flag: Option<bool>) -> f64 {
+        match flag {
+            Some(true) => self.set,
+            Some(false) => self.unset,
+            None => 0.0,
+        }
+    }
+}
+
+/// The stretch of each clip that most speaks for.
+fn spans(tracks: &[Vec<Track>], widths: &Widths, flags: &Flags) -> Vec<Option<Span>> {
+    tracks
+        .iter()
+        .enumerate()
+        .map(|(clip, tracks)| {
+            let best = tracks.iter().enumerate().filter_map(|(t, track)| best_span(t, track, clip, widths, flags));
+            best.fold(None, |best: Option<Span>, span| match best {
+                Some(b) if b.nats >= span.nats => Some(b),
+                _ => Some(span),
+            })
+        })
+        .collect()
+}
+
+/// Sum of what each sample says, and of how near the furniture is to the first sample before the clip, to the last one
+/// after it: before, during and after are one chain.
+fn best_span(index: usize, track: &Track, clip: usize, widths: &Widths, flags: &Flags) -> Option<Span> {
+    let n = track.frames.len();
+    let mut sum = 0.0;
+    let mut start: Option<(f64, usize)> = None;
+    let mut best: Option<Span> = None;
+    for i in 0..n {
+        let begin = widths.nats(clip, track.before[i]) - sum;
+        if i <= track.starts_by && start.is_none_or(|(b, _)| begin > b) {
+            start = Some((begin, i));
+        }
+        let says = widths.nats(clip, track.now[i]) + flags.nats(track.flags[i]);
+        sum += says.clamp(-SAYS_AT_MOST, SAYS_AT_MOST);
+        let Some((begin, first)) = start.filter(|_| i >= track.ends_from) else { continue };
+        let nats = begin + sum + widths.nats(clip, track.after[i]);
+        if nats > 0.0 && best.is_none_or(|b| nats > b.nats) {
+            best = Some(Span { track: index, first, last: i, nats });
+        }
+    }
+    best
+}
+
+/// A frame's depth without hands.
+struct View<'a> {
+    recording: &'a Recording,
+    frame: &'a Frame,
+    depth: Grid<f32>,
+    mask: Option<Grid<u8>>,
+    /// Bones of the hands that the mask misses, in pixels: ends and half width.
+    bones: Vec<([f64; 2], [f64; 2], f64)>,
+    /// Pixels by which masks are taken to be off at a hand's rim.
+    rim: isize,
+}
+
+impl<'a> View<'a> {
+    fn of(recording: &'a Recording, index: usize) -> Result<Option<Self>> {
+        let Some(frame) = recording.frames.get(index).filter(|f| f.files.depth.is_some()) else { return Ok(None) };
+        let Some(depth) = recording.depth(index)? else { return Ok(None) };
+        let mask = recording.mask(index)?;
+        // Four pixels of 640: what segmenters smear.
+        let rim = ((recording.camera.width as f64 / 160.0).round() as isize).max(1);
+        let mut view = Self { recording, frame, depth, mask, bones: Vec::new(), rim };
+        for hand in recording.hands_in(index, index) {
+            view.bones.extend(view.missed_bones(hand));
+        }
+        Ok(Some(view))
+    }
+
+    /// A hand's bones where the mask does not show the hand.
+    fn missed_bones(&self, hand: &HandSample) -> Vec<([f64; 2], [f64; 2], f64)> {
+        /// Half of a finger's breadth and what a tracked hand is off sideways, metres.
+        const HALF_WIDTH_M: f64 = 0.03;
+        let camera_from_world = self.frame.world_from_camera.inverse();
+        let camera = &self.recording.camera;
+        let on_image = |p: &Point| {
+            let local = camera_from_world * p;
+            camera.project(&local).map(|(u, v)| ([u, v], HALF_WIDTH_M * camera.fx / local.z))
+        };
+        let points = hand.skeleton();
+        let seen: Vec<[f64; 2]> = points.iter().filter_map(|p| on_image(p).map(|(uv, _)| uv)).collect();
+        let masked = seen.iter().filter(|uv| self.is_masked(uv[0], uv[1])).count();
+        if seen.is_empty() || 3 * masked > seen.len() {
+            return Vec::new();
+        }
+        let bones = hand.bones();
+        bones
+            .iter()
+            .filter_map(|[a, b]| {
+                let ((a, wide), (b, _)) = (on_image(a)?, on_image(b)?);
+                Some((a, b, wide))
+            })
+            .collect()
+    }
+
+    fn is_masked(&self, u: f64, v: f64) -> bool {
+        let Some(mask) = &self.mask else { return false };
+        let (u, v) = (u.round() as isize, v.round() as isize);
+        [-self.rim, 0, self.rim].iter().any(|dv| {
+            [-self.rim, 0, self.rim].iter().any(|du| {
+                let (x, y) = (u + du, v + dv);
+                x >= 0
+                    && y >= 0
+                    && (x as usize) < mask.width
+                    && (y as usize) < mask.height
+                    && mask.data[y as usize * mask.width + x as usize] == HAND_CLASS
+            })
+        })
+    }
+
+    fn is_hand(&self, u: f64, v: f64) -> bool {
+        self.is_masked(u, v)
+            || self.bones.iter().any(|(a, b, wide)| {
+                let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+                let length = dx * dx + dy * dy;
+                let along = if length > 0.0 { ((u - a[0]) * dx + (v - a[1]) * dy) / length } else { 0.0 };
+                let s = along.clamp(0.0, 1.0);
+                (u - a[0] - s * dx).hypot(v - a[1] - s * dy) < *wide
+            })
+    }
+
+    /// Distance to the nearest surface that is not a hand, at most [`REACH_M`]; `None` where the place is not in view.
+    fn nearest_m(&self, place: &Point) -> Option<f64> {
+        /// Surfaces are sampled this finely, metres.
+        const STEP_M: f64 = 0.012;
+        let camera = &self.recording.camera;
+        let local = self.frame.world_from_camera.inverse() * place;
+        let (u, v) = camera.project(&local).filter(|(u, v)| camera.contains(*u, *v))?;
+        let pixels_per_m = camera.fx / local.z;
+        let step = ((STEP_M * pixels_per_m) as usize).max(1);
+        let reach = REACH_M * pixels_per_m;
+        let range = |c: f64, size: usize| {
+            let (low, high) = ((c - reach).max(0.0) as usize, (c + reach).max(0.0) as usize);
+            (low / step * step..(high + 1).min(size)).step_by(step)
+        };
+        let mut best = REACH_M;
+        for y in range(v, self.depth.height) {
+            for x in range(u, self.depth.width) {
+                let z = f64::from(self.depth.data[y * self.depth.width + x]);
+                if z <= 0.0 || (z - local.z).abs() >= best {
+                    continue;
+                }
+                let distance = (camera.unproject(x as f64, y as f64, z) - local).norm();
+                if distance < best && !self.is_hand(x as f64, y as f64) {
+                    best = distance;
+                }
+            }
+        }
+        Some(best)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A hand that comes from 25 cm away in 8 samples, holds for 20 and goes in 8.
+    fn track(flag: impl Fn(usize, bool) -> Option<bool>) -> Track {
+        let distance = |i: usize| match i {
+            0..8 => 0.25 - 0.028 * i as f64,
+            8..28 => 0.03 + 0.01 * ((i * 7 % 5) as f64 / 4.0 - 0.5),
+            _ => 0.03 + 0.03 * (i - 27) as f64,
+        };
+        let n = 36;
+        let held = |i: usize| (8..28).contains(&i);
+        Track {
+            side: Side::Right,
+            frames: (100..100 + n).collect(),
+            now: (0..n).map(|i| Some(distance(i))).collect(),
+            before: (0..n).map(|i| (i < 12).then_some(distance(i))).collect(),
+            after: (0..n).map(|i| (i > 24).then_some(distance(i))).collect(),
+            flags: (0..n).map(|i| flag(i, held(i))).collect(),
+            starts_by: 30,
+            ends_from: 4,
+        }
+    }
+
+    fn found(track: Track) -> (Span, Flags) {
+        let tracks = vec![vec![track]];
+        let mut spans = spans(&tracks, &Widths::default(), &Flags::default());
+        let widths = Widths::of(&tracks, &spans);
+        spans = super::spans(&tracks, &widths, &Flags::default());
+        let flags = Flags::of(&tracks, &spans);
+        (super::spans(&tracks, &widths, &flags)[0].unwrap(), flags)
+    }
+
+    #[test]
+    fn a_hold_is_found_without_flags_to_two_samples() {
+        let (span, flags) = found(track(|_, _| None));
+        assert!(span.first.abs_diff(8) <= 2 && span.last.abs_diff(27) <= 2, "{span:?}");
+        // Nothing was flagged: the flags keep what they are taken for.
+        assert!((flags.set - 9f64.ln()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn flags_that_are_always_set_say_next_to_nothing() {
+        let (span, flags) = found(track(|_, _| Some(true)));
+        assert!(flags.set < 0.7, "{flags:?}");
+        assert!(span.first.abs_diff(8) <= 2 && span.last.abs_diff(27) <= 2, "{span:?}");
+    }
+
+    #[test]
+    fn one_wrong_flag_in_seven_moves_no_end() {
+        let (span, flags) = found(track(|i, held| Some(held != (i % 7 == 3))));
+        assert!(flags.set > 1.0 && flags.unset < -1.0, "{flags:?}");
+        assert!(span.first.abs_diff(8) <= 2 && span.last.abs_diff(27) <= 2, "{span:?}");
+    }
+
+    #[test]
+    fn a_hand_in_the_air_holds_nothing() {
+        let mut waving = track(|_, _| None);
+        for d in [&mut waving.now, &mut waving.before, &mut waving.after] {
+            d.iter_mut().for_each(|d| *d = Some(0.25));
+        }
+        assert_eq!(spans(&[vec![waving]], &Widths::default(), &Flags::default()), [None]);
+    }
+
+    #[test]
+    fn gaps_are_filled_only_where_they_are_short() {
+        let known = [Some(0.0), None, Some(1.0), None, Some(2.0)];
+        assert_eq!(between(&[0.0, 0.1, 0.2, 5.0, 9.0], &known, 0.5), [Some(0.0), Some(0.5), Some(1.0), None, Some(2.0)]);
+    }
+}
