@@ -95,10 +95,8 @@ fn chosen<'a>(blob: &Blob, layers: &'a [FlatLayer]) -> Result<(&'a FlatLayer, &'
     let all: Vec<(&FlatLayer, &AnyChannel<FlatSamples>)> =
         layers.iter().flat_map(|l| l.channel_data.list.iter().map(move |c| (l, c))).collect();
     let name = |layer: &FlatLayer| layer.attributes.layer_name.as_ref().map(ToString::to_string).unwrap_or_default();
-    let named = all
-        .iter()
-        .filter_map(|(l, c)| Some((rank(&name(l), &c.name.to_string())?, *l, *c)))
-        .min_by_key(|found| found.0);
+    let named =
+        all.iter().filter_map(|&(l, c)| Some((rank(&name(l), &c.name.to_string())?, l, c))).min_by_key(|found| found.0);
     match (named, all.as_slice()) {
         (Some((_, layer, channel)), _) if is_coloured(layer, channel) => Err(blob.fault(format!(
             "is a colour picture: channel {} differs from the others; depth has one channel",
