@@ -281,16 +281,7 @@ mod tests {
     use super::*;
 
     fn how(coding: DepthCoding) -> Depth {
-        Depth {
-            coding,
-            along: super::super::capture::Along::Z,
-            is_metric: true,
-            optics: None,
-            color_from_depth: None,
-            rays: None,
-            least_confidence: 2,
-            items: Vec::new(),
-        }
+        Depth { least_confidence: 2, ..Depth::of(coding, Vec::new()) }
     }
 
     fn inline(bytes: &[u8]) -> Blob {
