@@ -3,6 +3,8 @@
 
 #![allow(clippy::unwrap_used, missing_docs, reason = "a bench that cannot run should say so at once")]
 
+mod kitchen;
+
 use std::hint::black_box;
 use std::time::Duration;
 
@@ -12,7 +14,7 @@ use paws_twin::geometry::segments;
 use paws_twin::pipeline;
 use paws_twin::reasoning::heuristic::Geometric;
 use paws_twin::recording::Recording;
-use paws_twin::synth::{Options, Recorded, Tier};
+use paws_twin::synth::{Options, Tier};
 
 /// Seconds between the end of a round and the next one.
 const PAUSE_SECS: f64 = 0.5;
@@ -44,16 +46,7 @@ fn repeated(recording: &Recording, rounds: usize) -> Recording {
 }
 
 fn growth(c: &mut Criterion) {
-    let dir = tempfile::tempdir().unwrap();
-    let recorded = Recorded::new(&Options { seed: 1, tier: Tier::Hd, width: 160, parts: 4 }).unwrap();
-    let images = (0..recorded.frames()).flat_map(|frame| recorded.images(frame).unwrap());
-    let tables = recorded.tables().unwrap().into_iter().map(|(name, text)| (name, text.into_bytes()));
-    for (name, bytes) in tables.chain(images) {
-        let path = dir.path().join(name);
-        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-        std::fs::write(path, bytes).unwrap();
-    }
-    let short = Recording::open(dir.path()).unwrap();
+    let (_dir, short) = kitchen::recorded(&Options { seed: 1, tier: Tier::Hd, width: 160, parts: 4 });
     let config = Config::default();
     let reasoner = Geometric { reasoning: config.reasoning.clone(), inference: config.inference.clone() };
     let mut group = c.benchmark_group("growth");

@@ -12,7 +12,7 @@ use paws_twin::evaluation::stages::SceneTruth;
 use paws_twin::evaluation::{Predictions, Truth};
 use paws_twin::fitting::joints::{self, JointsFile};
 use paws_twin::import::blob::{self, Blob};
-use paws_twin::import::capture::{Along, ByteOrder, Depth, DepthCoding};
+use paws_twin::import::capture::{ByteOrder, Depth, DepthCoding};
 use paws_twin::import::decode;
 use paws_twin::import::formats::{self, Format};
 use paws_twin::model::{self, check, furniture};
@@ -282,16 +282,7 @@ fn depth(_: &mut Files, bytes: &[u8]) {
         4 => DepthCoding::RawF32 { width, height, order },
         _ => DepthCoding::RawU16 { width, height, order, unit_m },
     };
-    let how = Depth {
-        coding,
-        along: Along::Z,
-        is_metric: true,
-        optics: None,
-        color_from_depth: None,
-        rays: None,
-        least_confidence: 0,
-        items: Vec::new(),
-    };
+    let how = Depth::of(coding, Vec::new());
     told(decode::depth(&Blob::Inline(rest.into()), None, &how));
 }
 

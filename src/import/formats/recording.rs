@@ -7,8 +7,6 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use serde::Deserialize;
-
 use crate::error::{Error, Result};
 use crate::import::Options;
 use crate::import::blob::{Blob, inside};
@@ -20,56 +18,14 @@ use crate::import::joints::{JointOrder, TIPS};
 use crate::import::optics::Optics;
 use crate::import::text::Table;
 use crate::math::Vector;
-use crate::recording::{Clip, Side, reconstruction, segments};
+use crate::recording::tables::{self, CamerasFile, ClipsFile, FrameEntry, HandsFile, HandsFrame};
+use crate::recording::{Side, reconstruction, segments};
 
 /// Joints of a hand.
 const JOINTS: usize = 21;
 /// Normals are `(value - 128) / 127`.
 const NORMALS_ZERO: f64 = 128.0;
 const NORMALS_FACTOR: f64 = 1.0 / 127.0;
-
-#[derive(Deserialize)]
-struct Cameras {
-    width: usize,
-    height: usize,
-    fx: f64,
-    fy: f64,
-    cx: f64,
-    cy: f64,
-    frames: Vec<FrameRow>,
-}
-
-#[derive(Deserialize)]
-struct FrameRow {
-    file: Option<String>,
-    timestamp: f64,
-    position: [f64; 3],
-    rotation_wxyz: [f64; 4],
-}
-
-#[derive(Deserialize)]
-struct ClipsFile {
-    clips: Vec<Clip>,
-}
-
-#[derive(Deserialize)]
-struct HandsFile {
-    frames: Vec<HandsRow>,
-}
-
-#[derive(Deserialize)]
-struct HandsRow {
-    frame: usize,
-    hands: Vec<HandRow>,
-}
-
-#[derive(Deserialize)]
-struct HandRow {
-    side: Side,
-    contact: Option<bool>,
-    score: Option<f64>,
-    joints_world: Vec<[f64; 3]>,
-}
 
 pub(super) fn detect(path: &Path) -> bool {
     let has = |name: &str| path.join(name).is_file();
@@ -78,7 +34,7 @@ pub(super) fn detect(path: &Path) -> bool {
 
 pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
     let file = path.join("cameras.json");
-    let cameras: Cameras = crate::json::read(&file)?;
+    let cameras: CamerasFile = crate::json::read(&file)?;
     let optics = Optics::pinhole(cameras.width, cameras.height, [cameras.fx, cameras.fy, cameras.cx, cameras.cy]);
     if let Some(fault) = optics.fault() {
         return Err(Error::format(&file, "intrinsics", fault));
@@ -107,7 +63,7 @@ fn numbered(index: usize) -> At {
 }
 
 /// Poses and everything that is an image.
-fn frames(path: &Path, rows: &[FrameRow], out: &mut Capture) -> Result<()> {
+fn frames(path: &Path, rows: &[FrameEntry], out: &mut Capture) -> Result<()> {
     let (mut poses, mut depth, mut normals) = (Vec::new(), Vec::new(), Vec::new());
     let mut masks = Masks { labels: labels(path)?, items: Vec::new() };
     for (index, row) in rows.iter().enumerate() {
@@ -163,14 +119,8 @@ fn first(path: &Path, names: &[String]) -> Result<Option<std::path::PathBuf>> {
 }
 
 fn labels(path: &Path) -> Result<BTreeMap<u8, String>> {
-    let Some(file) = inside(path, "labels.json")? else { return Ok(BTreeMap::new()) };
-    let raw: BTreeMap<String, String> = crate::json::read(&file)?;
-    raw.into_iter()
-        .map(|(class, name)| match class.parse::<u8>() {
-            Ok(class) => Ok((class, name)),
-            Err(_) => Err(Error::format(&file, format!("key \"{class}\""), "classes are numbers 1 to 255")),
-        })
-        .collect()
+    // Where it leads elsewhere it is an error.
+    inside(path, "labels.json")?.map_or_else(|| Ok(BTreeMap::new()), |_| tables::labels(path))
 }
 
 fn clips(path: &Path, times: &[f64]) -> Result<Vec<ClipAt>> {
@@ -203,13 +153,13 @@ fn hands(path: &Path) -> Result<Option<Hands>> {
 /// `hands.json`: all joints.
 fn joints(file: &Path) -> Result<Vec<HandAt>> {
     let hands: HandsFile = crate::json::read(file)?;
-    let of_row = |row: HandsRow| {
+    let of_row = |row: HandsFrame| {
         row.hands.into_iter().map(move |hand| HandAt {
             at: numbered(row.frame),
             side: hand.side,
             joints: hand.joints_world.into_iter().map(Some).collect(),
             contact: hand.contact,
-            score: hand.score,
+            score: hand.score.as_ref().and_then(serde_json::Value::as_f64),
         })
     };
     Ok(hands.frames.into_iter().flat_map(of_row).collect())
