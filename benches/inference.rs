@@ -3,6 +3,8 @@
 
 #![allow(clippy::unwrap_used, missing_docs, reason = "a bench that cannot run should say so at once")]
 
+mod kitchen;
+
 use std::collections::BTreeMap;
 use std::hint::black_box;
 
@@ -16,20 +18,11 @@ use paws_twin::reasoning::heuristic::Geometric;
 use paws_twin::reasoning::{Question, Reasoner};
 use paws_twin::recording::sketch::Sketch;
 use paws_twin::recording::{Recording, narration};
-use paws_twin::synth::{Options, Recorded, Tier};
+use paws_twin::synth::{Options, Tier};
 
 /// From the hand and the names alone, and with the depth of the open states asked about every candidate.
 fn posterior(c: &mut Criterion) {
-    let dir = tempfile::tempdir().unwrap();
-    let recorded = Recorded::new(&Options { seed: 1, tier: Tier::T2, width: 320, parts: 4 }).unwrap();
-    let images = (0..recorded.frames()).flat_map(|frame| recorded.images(frame).unwrap());
-    let tables = recorded.tables().unwrap().into_iter().map(|(name, text)| (name, text.into_bytes()));
-    for (name, bytes) in tables.chain(images) {
-        let path = dir.path().join(name);
-        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-        std::fs::write(path, bytes).unwrap();
-    }
-    let recording = Recording::open(dir.path()).unwrap();
+    let (_dir, recording) = kitchen::recorded(&Options { seed: 1, tier: Tier::T2, width: 320, parts: 4 });
     let config = Config::default();
     let reasoner = Geometric { reasoning: config.reasoning.clone(), inference: config.inference.clone() };
     let scene = pipeline::infer(&recording, &config, &segments::Lsd, &reasoner, &|_, _, _| {}).unwrap();

@@ -10,11 +10,9 @@ mod imports;
 mod memory;
 mod targets;
 
-use libfuzzer_sys::fuzz_target;
+use libfuzzer_sys::{fuzz_target, Corpus};
 
 #[global_allocator]
 static ALLOCATOR: memory::Counting = memory::Counting;
 
-fuzz_target!(init: targets::choose(), |bytes: &[u8]| {
-    targets::run(bytes);
-});
+fuzz_target!(init: targets::choose(), |bytes: &[u8]| -> Corpus { targets::run(bytes) });

@@ -161,7 +161,7 @@ pub enum DepthCoding {
         /// Metres per count.
         unit_m: f64,
     },
-    /// OpenEXR, the channel Y, Z or the first one, metres.
+    /// OpenEXR, metres: the channel whose name says depth, else the only one.
     Exr,
     /// A numpy array of shape (rows, columns), with any more dimensions of size 1; float or unsigned.
     Npy {
@@ -236,6 +236,23 @@ pub struct Depth {
     pub least_confidence: u8,
     /// In any order.
     pub items: Vec<DepthAt>,
+}
+
+impl Depth {
+    /// Metric depth along the optical axis, of the colour camera, all pixels of it: what most sources have.
+    #[must_use]
+    pub fn of(coding: DepthCoding, items: Vec<DepthAt>) -> Self {
+        Self {
+            coding,
+            along: Along::Z,
+            is_metric: true,
+            optics: None,
+            color_from_depth: None,
+            rays: None,
+            least_confidence: 0,
+            items,
+        }
+    }
 }
 
 /// The frame that joints of hands are in.

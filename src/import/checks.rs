@@ -128,7 +128,7 @@ fn subject<'a>(imported: &'a Imported, posed: &Capture) -> Subject<'a> {
     };
     let hands = imported.hands.iter().filter_map(|h| {
         let [thumb, index, middle] = TIPS.map(|i| h.joints.get(i).copied().flatten());
-        Some((h.frame, Point::from((thumb?.coords + index?.coords + middle?.coords) / 3.0)))
+        Some((h.frame, Point::from((thumb?.coords + index?.coords + middle?.coords) / 3.0), h.side))
     });
     Subject {
         camera: imported.view.camera,

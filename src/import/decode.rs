@@ -12,9 +12,9 @@ use crate::recording::{Grid, images};
 /// A decoder may claim any size; a 4K RGB image needs 25 MB.
 const MAX_DECODED_BYTES: u64 = 512 << 20;
 /// Numbers that one byte of a file can stand for: deflate makes at most 1032 bytes of one, run lengths of wavelets more.
-const MOST_OF_A_BYTE: usize = 32 << 10;
+pub(super) const MOST_OF_A_BYTE: usize = 32 << 10;
 /// More pixels than any camera here has.
-const MAX_PIXELS: usize = 64 << 20;
+pub(super) const MAX_PIXELS: usize = 64 << 20;
 
 /// An image, its format told by its content.
 ///
@@ -128,7 +128,7 @@ pub fn depth(blob: &Blob, confidence: Option<&Blob>, how: &Depth) -> Result<Grid
     let mut grid = match how.coding {
         DepthCoding::Png16 { unit_m } => png(blob, unit_m)?,
         DepthCoding::Pgm16 { unit_m } => pgm(blob, unit_m)?,
-        DepthCoding::Exr => open_exr(blob)?,
+        DepthCoding::Exr => super::depth_exr::read(blob)?,
         DepthCoding::Npy { unit_m } => npy(blob, unit_m)?,
         DepthCoding::RawF32 { width, height, order } => {
             raw(blob, width, height, |[a, b, c, d]: [u8; 4]| match order {
@@ -271,50 +271,6 @@ fn npy(blob: &Blob, unit_m: f64) -> Result<Grid<f32>> {
     Ok(Grid { width, height, data })
 }
 
-/// The channel Y or Z, else the first one, of an OpenEXR image's first layer.
-fn open_exr(blob: &Blob) -> Result<Grid<f32>> {
-    use exr::prelude::{MetaData, ReadChannels, ReadLayers};
-    let bytes = blob.read()?;
-    let broken = |e: exr::error::Error| blob.fault(format!("is no OpenEXR image that can be read ({e})"));
-    // The header's word is checked before anything of its size is made.
-    let meta = MetaData::read_from_buffered(Cursor::new(&bytes), false).map_err(broken)?;
-    let pixels = meta
-        .headers
-        .iter()
-        .map(|h| h.layer_size.0.saturating_mul(h.layer_size.1).saturating_mul(h.channels.list.len()))
-        .fold(0, usize::saturating_add);
-    if meta.headers.iter().any(|h| h.deep) {
-        return Err(blob.fault("holds several samples a pixel (deep data); write it flat"));
-    }
-    if pixels > MAX_PIXELS {
-        return Err(blob.fault(format!("claims {pixels} numbers; depth has one channel")));
-    }
-    if pixels > bytes.len().saturating_mul(MOST_OF_A_BYTE) {
-        let length = bytes.len();
-        return Err(blob.fault(format!("claims {pixels} numbers, too many for its {length} bytes; is it cut off?")));
-    }
-    let image = exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .first_valid_layer()
-        .all_attributes()
-        .non_parallel()
-        .from_buffered(Cursor::new(&bytes))
-        .map_err(broken)?;
-    let channels = &image.layer_data.channel_data.list;
-    let named = |name: &str| channels.iter().find(|c| c.name == *name);
-    let Some(channel) = named("Y").or_else(|| named("Z")).or_else(|| channels.first()) else {
-        return Err(blob.fault("has no channel"));
-    };
-    let (width, height) = (image.layer_data.size.0, image.layer_data.size.1);
-    let data: Vec<f32> = channel.sample_data.values_as_f32().collect();
-    if data.len() != width * height {
-        return Err(blob.fault("has a channel of another size than the image"));
-    }
-    Ok(Grid { width, height, data })
-}
-
 /// A mistake of ours, should an encoder ever refuse.
 pub(super) fn encoding(e: &image::ImageError) -> Error {
     Error::Export(format!("an image cannot be encoded: {e}"))
@@ -325,16 +281,7 @@ mod tests {
     use super::*;
 
     fn how(coding: DepthCoding) -> Depth {
-        Depth {
-            coding,
-            along: super::super::capture::Along::Z,
-            is_metric: true,
-            optics: None,
-            color_from_depth: None,
-            rays: None,
-            least_confidence: 2,
-            items: Vec::new(),
-        }
+        Depth { least_confidence: 2, ..Depth::of(coding, Vec::new()) }
     }
 
     fn inline(bytes: &[u8]) -> Blob {

@@ -38,6 +38,7 @@ pub mod view;
 pub mod warp;
 
 mod assembly;
+mod depth_exr;
 mod imported;
 mod people;
 mod timeline;

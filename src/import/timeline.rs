@@ -144,6 +144,14 @@ pub(super) fn build(captures: &[Capture], options: &Options, report: &mut Report
             }
         }
         stream(report, name, out.iter().flatten().count(), of.len(), &captures[i], joined.by.words());
+        if i != base && is_numbered_anew(joined.by, &of, ats.len()) {
+            report.changes.push(format!(
+                "{name} of {} have the numbers 0 to {} without a gap and are joined to the first frames of {}: where a network                  ran on frames/ of a recording, that recording is the source to give",
+                source_name(&captures[i]),
+                of.len() - 1,
+                ats.len()
+            ));
+        }
         out
     };
     let items = Items {
@@ -167,6 +175,14 @@ pub(super) fn build(captures: &[Capture], options: &Options, report: &mut Report
         stream(report, "images", frames.len(), captures[base].images.len(), &captures[base], "these are the frames");
     }
     Ok(Timeline { frames, base, posed, track, gap_secs, has_times })
+}
+
+/// Whether items that are joined by their numbers look like those of fewer frames, numbered anew.
+fn is_numbered_anew(by: By, items: &[At], frames: usize) -> bool {
+    let mut numbers: Vec<usize> = items.iter().filter_map(|a| a.index).collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    by == By::Index && numbers.len() > 1 && numbers.len() < frames && numbers.iter().copied().eq(0..items.len())
 }
 
 /// Whether each frame has a hand. What they are is found once the frames are chosen.

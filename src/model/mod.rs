@@ -11,6 +11,7 @@ pub mod glb;
 mod gltf_extensions;
 mod gltf_file;
 mod kinds;
+mod limits;
 mod masses;
 mod mesh;
 pub mod mjcf;

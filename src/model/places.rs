@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::check::{MAX_SLIDE_M, Said, plain};
+use super::check::{Said, plain};
 use super::glb::{Places, SHARES, Scene};
+use super::limits::MAX_SLIDE_M;
 use super::{Model, Tree};
 use crate::articulation::JointKind;
 use crate::math;

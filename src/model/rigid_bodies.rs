@@ -2,8 +2,9 @@
 
 use serde_json::Value;
 
-use super::check::{MAX_SLIDE_M, Said, plain};
+use super::check::{Said, plain};
 use super::gltf_file::{index, list};
+use super::limits::MAX_SLIDE_M;
 use super::xml;
 
 /// The extension with bodies and joints.

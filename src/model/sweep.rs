@@ -4,8 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
-use super::check::{MAX_SLIDE_M, Said};
+use super::check::Said;
 use super::contacts::Contacts;
+use super::limits::MAX_SLIDE_M;
 use super::{Format, Kind, Model, ModelJoint, Shape, Tree, penetration};
 use crate::math::Pose;
 use crate::twin::OrientedBox;

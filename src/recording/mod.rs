@@ -15,6 +15,7 @@ pub(crate) mod reconstruction;
 pub mod segments;
 pub mod sketch;
 mod sniff;
+pub(crate) mod tables;
 pub mod trajectory;
 
 use std::collections::BTreeMap;

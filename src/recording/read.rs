@@ -6,9 +6,9 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Quaternion, UnitQuaternion};
-use serde::Deserialize;
 
 use super::folder::{Folder, MAX_COORDINATE};
+use super::tables::{self, CamerasFile, ClipsFile, FrameEntry, HandsFile, TIP_JOINTS};
 use super::{Camera, Clip, Frame, FrameFiles, HandSample, Recording, Side, reconstruction};
 use crate::error::{Error, Result};
 use crate::json;
@@ -18,58 +18,6 @@ use crate::math::{Point, Pose, Vector, stats};
 pub(super) const MAX_LINE_BYTES: u64 = 64 << 10;
 /// Faults of one kind that are listed before "and n more".
 const MAX_LISTED: usize = 5;
-
-#[derive(Deserialize)]
-struct CamerasFile {
-    width: usize,
-    height: usize,
-    fx: f64,
-    fy: f64,
-    cx: f64,
-    cy: f64,
-    frames: Vec<FrameEntry>,
-    #[serde(default)]
-    units: Option<String>,
-    #[serde(default)]
-    distortion: Option<serde_json::Value>,
-}
-
-#[derive(Deserialize)]
-struct FrameEntry {
-    frame: usize,
-    #[serde(default)]
-    file: Option<String>,
-    timestamp: f64,
-    position: [f64; 3],
-    rotation_wxyz: [f64; 4],
-}
-
-#[derive(Deserialize)]
-struct ClipsFile {
-    clips: Vec<Clip>,
-}
-
-#[derive(Deserialize)]
-struct HandsFile {
-    frames: Vec<HandsFrame>,
-}
-
-#[derive(Deserialize)]
-struct HandsFrame {
-    frame: usize,
-    hands: Vec<HandEntry>,
-}
-
-#[derive(Deserialize)]
-struct HandEntry {
-    side: Side,
-    #[serde(default)]
-    contact: Option<bool>,
-    joints_world: Vec<[f64; 3]>,
-}
-
-/// Thumb, index and middle tips in MANO/OpenPose order.
-const TIP_JOINTS: [usize; 3] = [4, 8, 12];
 
 /// Faults, with a bound on how many of one kind are spelled out.
 #[derive(Default)]
@@ -131,7 +79,7 @@ pub(super) fn open(dir: &Path, follow_links: bool, judge: bool) -> Result<Record
     check_clips(&clips.clips, frames.len(), &mut faults);
     let hands = hands(dir, frames.len(), &mut faults)?;
     check_hands(&hands, &frames, judge, &mut faults);
-    let labels = labels(dir)?;
+    let labels = tables::labels(dir)?;
     let reconstruction = reconstruction::read(dir)?;
     faults.finish(dir)?;
 
@@ -495,18 +443,4 @@ fn check_hands(hands: &[HandSample], frames: &[Frame], judge: bool, faults: &mut
             ),
         );
     }
-}
-
-fn labels(dir: &Path) -> Result<BTreeMap<u8, String>> {
-    let path = dir.join("labels.json");
-    if !path.is_file() {
-        return Ok(BTreeMap::new());
-    }
-    let raw: BTreeMap<String, String> = json::read(&path)?;
-    raw.into_iter()
-        .map(|(class, name)| match class.parse::<u8>() {
-            Ok(class) => Ok((class, name)),
-            Err(_) => Err(Error::format(&path, format!("key \"{class}\""), "classes are numbers 1 to 255")),
-        })
-        .collect()
 }

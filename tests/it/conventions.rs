@@ -4,8 +4,8 @@ use std::sync::LazyLock;
 
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
 use paws_twin::math::{Point, Pose, Vector};
-use paws_twin::recording::Recording;
 use paws_twin::recording::conventions::{Finding, Subject, findings, repaired};
+use paws_twin::recording::{Recording, Side};
 use paws_twin::synth::{Options, Tier};
 use serde_json::Value;
 use tempfile::TempDir;
@@ -61,6 +61,22 @@ fn shift_hands(recording: &mut Recording, by: usize) {
     let frames = recording.frames.len();
     recording.hands.iter_mut().for_each(|h| h.frame += by);
     recording.hands.retain(|h| h.frame < frames);
+}
+
+/// Mirrors hands in the x of their frame's camera.
+fn mirror_hands(recording: &mut Recording) {
+    let frames = recording.frames.clone();
+    for hand in &mut recording.hands {
+        let pose = frames[hand.frame].world_from_camera;
+        hand.tips = hand.tips.map(|p| {
+            let seen = pose.inverse() * p;
+            pose * Point::new(-seen.x, seen.y, seen.z)
+        });
+    }
+}
+
+fn without_masks(recording: &mut Recording) {
+    recording.frames.iter_mut().for_each(|f| f.files.mask = None);
 }
 
 /// A wrong convention: its name, what it does, words of its finding.
@@ -136,17 +152,61 @@ fn every_wrong_convention_is_named() {
 }
 
 #[test]
+fn hands_are_judged_by_what_they_hide_where_no_mask_shows_them() {
+    const LATE: [Tier; 3] = [Tier::Clean, Tier::T1, Tier::T2];
+    const MIRRORED: [Tier; 4] = [Tier::Clean, Tier::T1, Tier::T2, Tier::Hd];
+    let wrong: [(&[Tier], fn(&mut Recording), &str); 2] = [
+        (&LATE, |r| shift_hands(r, 10), "the hands come 0.83 s (10 frames) too late"),
+        (&MIRRORED, mirror_hands, "mirrored in the camera's x"),
+    ];
+    for (tier, dir) in TIERS.iter() {
+        for (tiers, change, words) in wrong {
+            if !tiers.contains(tier) {
+                continue;
+            }
+            let mut recording = Recording::open(dir.path()).unwrap();
+            without_masks(&mut recording);
+            change(&mut recording);
+            let all = found(&recording);
+            let told = all.iter().find(|f| f.what.contains(words));
+            let said = told.is_some_and(|f| f.evidence.contains("hide what is behind them") && !f.remedy.is_empty());
+            assert!(said && all.len() == 1, "{} {words}: {all:#?}", tier.name());
+        }
+    }
+}
+
+#[test]
+fn swapped_sides_of_third_party_hands_are_named() {
+    let Some(dir) = optional_data("recordings/apartment_realistic") else { return };
+    let mut recording = Recording::open(&dir).unwrap();
+    for hand in &mut recording.hands {
+        hand.side = if hand.side == Side::Left { Side::Right } else { Side::Left };
+    }
+    let all = found(&recording);
+    assert!(all.len() == 1 && all[0].what.contains("swapped") && !all[0].ruinous, "{all:#?}");
+}
+
+#[test]
 fn right_recordings_raise_no_alarm() {
     let shift: fn(&mut Recording) = |r| shift_hands(r, 2);
     type Change = (&'static str, fn(&mut Recording));
-    let harmless: [Change; 5] = [
+    let harmless: [Change; 7] = [
         ("as it is", |_| {}),
         ("a focal length 5 % off", |r| {
             r.camera.fx *= 1.05;
             r.camera.fy *= 1.05;
         }),
         ("hands two frames late", shift),
-        ("no masks", |r| r.frames.iter_mut().for_each(|f| f.files.mask = None)),
+        ("no masks", without_masks),
+        ("no masks, hands two frames late", |r| {
+            without_masks(r);
+            shift_hands(r, 2);
+        }),
+        ("no masks, a focal length 5 % off", |r| {
+            without_masks(r);
+            r.camera.fx *= 1.05;
+            r.camera.fy *= 1.05;
+        }),
         ("no depth", |r| r.frames.iter_mut().for_each(|f| f.files.depth = None)),
     ];
     for (tier, dir) in TIERS.iter() {
@@ -167,8 +227,27 @@ fn right_recordings_raise_no_alarm() {
 fn third_party_recordings_raise_no_alarm() {
     for name in ["apartment_clean", "apartment_realistic", "apartment_hard"] {
         let Some(dir) = optional_data(&format!("recordings/{name}")) else { return };
-        let all = found(&Recording::open(&dir).unwrap());
+        let mut recording = Recording::open(&dir).unwrap();
+        let all = found(&recording);
         assert!(all.is_empty(), "{name}: {all:#?}");
+        without_masks(&mut recording);
+        let all = found(&recording);
+        assert!(all.is_empty(), "{name} without masks: {all:#?}");
+    }
+}
+
+#[test]
+fn third_party_hands_of_another_time_are_named_without_masks() {
+    for name in ["apartment_clean", "apartment_realistic"] {
+        let Some(dir) = optional_data(&format!("recordings/{name}")) else { return };
+        let mut recording = Recording::open(&dir).unwrap();
+        without_masks(&mut recording);
+        shift_hands(&mut recording, 10);
+        let all = found(&recording);
+        assert!(
+            all.iter().any(|f| f.what.contains("the hands come") && f.what.contains("too late")),
+            "{name}: {all:#?}"
+        );
     }
 }
 

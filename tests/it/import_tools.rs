@@ -566,6 +566,54 @@ fn broken_files_of_tools_are_named() {
     assert!(stderr(&out).contains("azure_tf.json") && stderr(&out).contains("arti4d-meta.zip"), "{}", stderr(&out));
 }
 
+/// Folders as MoGe writes them for the images in `frames/` of a recording, with the recording's own depth.
+fn write_moge_of(recording: &Path, root: &Path) -> usize {
+    let mut count = 0;
+    while recording.join(format!("frames/{count:06}.jpg")).is_file() {
+        let depth = image::open(recording.join(format!("depth/{count:06}.png"))).unwrap().into_luma16();
+        let size = (depth.width() as usize, depth.height() as usize);
+        let metres = depth.into_raw().into_iter().map(|mm| 1e-3 * f32::from(mm)).collect();
+        let mut list = SmallVec::new();
+        list.push(AnyChannel::new("Y", FlatSamples::F32(metres)));
+        let folder = root.join(format!("{count:06}"));
+        std::fs::create_dir_all(&folder).unwrap();
+        Image::from_channels(size, AnyChannels::sort(list)).write().to_file(folder.join("depth.exr")).unwrap();
+        count += 1;
+    }
+    count
+}
+
+#[test]
+fn what_networks_make_of_the_frames_of_a_recording_meets_them_again() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = |args: &[&str]| {
+        let out = paws(args, dir.path());
+        assert_eq!(out.status.code(), Some(0), "{args:?}: {}", stderr(&out));
+        String::from_utf8(out.stdout).unwrap()
+    };
+    let source = SMALL.path().to_str().unwrap();
+    // Fewer frames, numbered anew.
+    run(&["import", source, "--fps", "3", "--out", "rec"]);
+    let rec = dir.path().join("rec");
+    let count = write_moge_of(&rec, &dir.path().join("moge"));
+    assert!(2 < count && 2 * count < small().frames.len(), "{count}");
+    let text = run(&["import", "moge", "rec", "--fps", "0", "--out", "joined"]);
+    assert!(text.contains("moge"), "{text}");
+    let joined = dir.path().join("joined");
+    let (m, deg) = apart(&poses(&rec), &poses(&joined));
+    assert!(m < 1e-9 && deg < 1e-5, "{m} m, {deg} degrees");
+    for i in 0..count {
+        let name = format!("depth/{i:06}.png");
+        assert_eq!(depth_mm(&rec.join(&name)), depth_mm(&joined.join(&name)), "{i}");
+    }
+    let tables = |of: &Path, name: &str| read_json(&of.join(name));
+    assert_eq!(tables(&rec, "clips.json"), tables(&joined, "clips.json"));
+    assert_eq!(tables(&rec, "hands.json")["frames"].as_array().map(Vec::len), {
+        tables(&joined, "hands.json")["frames"].as_array().map(Vec::len)
+    });
+    assert_eq!(read_json(&joined.join("import.json"))["sources"][1]["kind"], "recording");
+}
+
 #[test]
 fn one_bad_depth_of_a_network_costs_only_itself() {
     let dir = tempfile::tempdir().unwrap();

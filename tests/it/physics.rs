@@ -66,6 +66,11 @@ fn on(articulation: Articulation) -> Furniture {
     furniture
 }
 
+/// A grip that goes where a hand went, when it did.
+fn drive(hand: &Trajectory, grip: Point, back: bool) -> Drive {
+    Drive { times_secs: hand.samples.iter().map(|s| s.time_secs).collect(), path: hand.positions(), grip, back }
+}
+
 /// A hand that opens `joint` by `range` in two seconds, holding the door's handle.
 fn hand(joint: &Articulation, range: f64) -> Trajectory {
     let handle = door().part.handle;
@@ -350,12 +355,7 @@ fn furniture_in_the_way_stops_the_part() {
     let part = &furniture.part;
     let joint = part.joint.articulation;
     let hand = hand(&joint, 1.2);
-    let drive = Drive {
-        times_secs: hand.samples.iter().map(|s| s.time_secs).collect(),
-        path: hand.positions(),
-        grip: part.handle,
-        back: true,
-    };
+    let drive = drive(&hand, part.handle, true);
     let wall = solid("wall", Role::Room, upright(Point::new(0.25, -0.35, 0.35), Vector::new(0.5, 0.02, 0.5)));
     let config = Config::default().validation;
     let up = Vector::z();
@@ -376,12 +376,8 @@ fn a_motion_that_begins_inside_something_begins_before_it() {
     let joint = part.joint.articulation;
     let mut hand = hand(&joint, 1.2);
     hand.samples.reverse();
-    let drive = Drive {
-        times_secs: (0..hand.samples.len()).map(|i| 0.05 * i as f64).collect(),
-        path: hand.positions(),
-        grip: part.handle,
-        back: true,
-    };
+    let times_secs = (0..hand.samples.len()).map(|i| 0.05 * i as f64).collect();
+    let drive = Drive { times_secs, ..drive(&hand, part.handle, true) };
     // Where the leaf stands when it is open.
     let there = joint.motion(1.2) * part.bounds.center;
     let block = solid("block", Role::Room, upright(there, Vector::new(0.1, 0.1, 0.5)));
@@ -399,12 +395,7 @@ fn a_part_of_grams_follows_the_hand_and_is_not_thrown() {
     let part = &furniture.part;
     let joint = part.joint.articulation;
     let hand = hand(&joint, 1.2);
-    let drive = Drive {
-        times_secs: hand.samples.iter().map(|s| s.time_secs).collect(),
-        path: hand.positions(),
-        grip: part.handle,
-        back: true,
-    };
+    let drive = drive(&hand, part.handle, true);
     let up = Vector::z();
     // 620, 62, 6 and 0.6 g.
     for density in [100.0, 10.0, 1.0, 0.1] {
@@ -421,12 +412,7 @@ fn a_tenth_of_a_millimetre_is_no_obstacle_and_a_millimetre_is_one() {
     let part = &furniture.part;
     let joint = part.joint.articulation;
     let hand = hand(&joint, 1.2);
-    let drive = Drive {
-        times_secs: hand.samples.iter().map(|s| s.time_secs).collect(),
-        path: hand.positions(),
-        grip: part.handle,
-        back: false,
-    };
+    let drive = drive(&hand, part.handle, false);
     let up = Vector::z();
     // The leaf's outer edge passes 0.498 m from the hinge: a post beyond it, away from the closed leaf, reaches into its way.
     for (depth, stopped) in [(5e-5, false), (4e-3, true)] {
@@ -447,12 +433,7 @@ fn what_a_model_excludes_does_not_stand_in_the_way() {
     let part = &furniture.part;
     let joint = part.joint.articulation;
     let hand = hand(&joint, 1.2);
-    let drive = Drive {
-        times_secs: hand.samples.iter().map(|s| s.time_secs).collect(),
-        path: hand.positions(),
-        grip: part.handle,
-        back: false,
-    };
+    let drive = drive(&hand, part.handle, false);
     let wall = solid("wall", Role::Room, upright(Point::new(0.25, -0.35, 0.35), Vector::new(0.5, 0.02, 0.5)));
     let rule = |link: usize, masks: [u32; 2]| ContactRule { link, body: link, masks };
     let up = Vector::z();

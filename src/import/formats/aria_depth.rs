@@ -110,16 +110,7 @@ pub(super) fn stream(seen: &[Seen], points: &[Point]) -> Option<(Depth, String)>
         Some(DepthAt { at: At::time(s.time_secs), blob, confidence: None, optics: Some(s.optics), pose: Some(pose) })
     };
     let items: Vec<DepthAt> = seen.iter().filter_map(item).collect();
-    let mut depth = Depth {
-        coding: DepthCoding::Png16 { unit_m: 1e-3 },
-        along: Along::Z,
-        is_metric: true,
-        optics: None,
-        color_from_depth: None,
-        rays: None,
-        least_confidence: 0,
-        items,
-    };
+    let mut depth = Depth::of(DepthCoding::Png16 { unit_m: 1e-3 }, items);
     if depth.items.is_empty() {
         return None;
     }

@@ -14,8 +14,8 @@ use crate::import::Options;
 use crate::import::axes::quaternion;
 use crate::import::blob::{Blob, files};
 use crate::import::capture::{
-    Along, At, Capture, ClipAt, Depth, DepthAt, DepthCoding, ImageAt, Picture, PoseAt, Poses, QuaternionOrder, RawPose,
-    Turn, World,
+    At, Capture, ClipAt, Depth, DepthAt, DepthCoding, ImageAt, Picture, PoseAt, Poses, QuaternionOrder, RawPose, Turn,
+    World,
 };
 use crate::import::names::{last, stem};
 use crate::import::optics::{Lens, Optics};
@@ -110,14 +110,9 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         poses: Some(Poses { body_from_camera: Some(base_from_rgb * turn), items: poses, ..Poses::default() }),
         images,
         depth: (!depth.is_empty()).then_some(Depth {
-            coding: DepthCoding::Png16 { unit_m: 1e-3 },
-            along: Along::Z,
-            is_metric: true,
             optics: own,
             color_from_depth,
-            rays: None,
-            least_confidence: 0,
-            items: depth,
+            ..Depth::of(DepthCoding::Png16 { unit_m: 1e-3 }, depth)
         }),
         ..Capture::default()
     })

@@ -241,16 +241,8 @@ fn depth(path: &Path, notes: &mut Vec<String>) -> Result<Option<Depth>> {
     if items.len() < images.len() {
         notes.push(format!("{} depth images have no pose and were left out", images.len() - items.len()));
     }
-    let depth = Depth {
-        coding: DepthCoding::Pgm16 { unit_m: 1e-3 },
-        along: Along::Ray,
-        is_metric: true,
-        optics: None,
-        color_from_depth: None,
-        rays: Some(rays(&table)?),
-        least_confidence: 0,
-        items,
-    };
+    let depth =
+        Depth { along: Along::Ray, rays: Some(rays(&table)?), ..Depth::of(DepthCoding::Pgm16 { unit_m: 1e-3 }, items) };
     Ok((!depth.items.is_empty()).then_some(depth))
 }
 

@@ -12,9 +12,7 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use crate::import::Options;
 use crate::import::blob::{Blob, files};
-use crate::import::capture::{
-    Along, At, ByteOrder, Capture, Depth, DepthAt, DepthCoding, ImageAt, Picture, PixelCoding,
-};
+use crate::import::capture::{At, ByteOrder, Capture, Depth, DepthAt, DepthCoding, ImageAt, Picture, PixelCoding};
 use crate::import::mcap::{Channel, Message, Visitor, Want, scan};
 use crate::import::ros::{self, CameraInfo, Header, Posed};
 use crate::import::tf::Tree;
@@ -309,16 +307,7 @@ fn depth(bag: &Bag, topic: &str, color: Option<&str>, notes: &mut Vec<String>) -
         }
         pose
     });
-    Some(Depth {
-        coding,
-        along: Along::Z,
-        is_metric: true,
-        optics,
-        color_from_depth,
-        rays: None,
-        least_confidence: 0,
-        items,
-    })
+    Some(Depth { optics, color_from_depth, ..Depth::of(coding, items) })
 }
 
 /// A recording without anything to read.

@@ -31,6 +31,7 @@ mod polycam;
 mod quest;
 mod quest_hands;
 mod record3d;
+mod recording;
 mod stera;
 mod stray;
 mod subtitles;
@@ -60,6 +61,13 @@ pub struct Format {
 
 /// All formats. Where several fit a path, the first one is taken: special ones stand before general ones.
 pub const ALL: &[Format] = &[
+    Format {
+        name: "recording",
+        title: "a recording of ours, for what networks made of its frames/",
+        holds: "all streams",
+        detect: recording::detect,
+        read: recording::read,
+    },
     Format {
         name: "stray",
         title: "Stray Scanner folder (iPhone, iPad with LiDAR)",

@@ -11,7 +11,7 @@ use serde::Deserialize;
 use crate::error::{Error, Result};
 use crate::import::Options;
 use crate::import::blob::{Blob, files, inside};
-use crate::import::capture::{Along, At, Capture, Depth, DepthAt, DepthCoding, ImageAt, Normals, NormalsAt, Picture};
+use crate::import::capture::{At, Capture, Depth, DepthAt, DepthCoding, ImageAt, Normals, NormalsAt, Picture};
 use crate::import::names::{last, numbered};
 use crate::import::optics::{Optics, from_corner};
 
@@ -103,16 +103,7 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         optics,
         optics_estimated: true,
         images,
-        depth: Some(Depth {
-            coding: DepthCoding::Exr,
-            along: Along::Z,
-            is_metric: true,
-            optics: None,
-            color_from_depth: None,
-            rays: None,
-            least_confidence: 0,
-            items: depth,
-        }),
+        depth: Some(Depth::of(DepthCoding::Exr, depth)),
         normals: (!normals.is_empty()).then(|| Normals {
             zero: ZERO,
             factor: [FACTOR, -FACTOR, -FACTOR],

@@ -13,8 +13,7 @@ use crate::error::{Error, Result};
 use crate::import::Options;
 use crate::import::blob::{Blob, inside};
 use crate::import::capture::{
-    Along, At, CameraAxes, Capture, Depth, DepthAt, DepthCoding, ImageAt, Missing, Picture, PoseAt, Poses, RawPose,
-    World,
+    At, CameraAxes, Capture, Depth, DepthAt, DepthCoding, ImageAt, Missing, Picture, PoseAt, Poses, RawPose, World,
 };
 use crate::import::names::{ending, head};
 use crate::import::optics::{Lens, Optics, from_corner};
@@ -117,16 +116,7 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         optics: items.first().and_then(|i: &PoseAt| i.optics),
         poses: Some(Poses { axes: CameraAxes::Opengl, items, ..Poses::default() }),
         images,
-        depth: has_depth.then_some(Depth {
-            coding: DepthCoding::Png16 { unit_m },
-            along: Along::Z,
-            is_metric: true,
-            optics: None,
-            color_from_depth: None,
-            rays: None,
-            least_confidence: 0,
-            items: depth,
-        }),
+        depth: has_depth.then_some(Depth::of(DepthCoding::Png16 { unit_m }, depth)),
         points,
         missing: missing.into_iter().collect(),
         ..Capture::default()

@@ -12,7 +12,7 @@ use serde_json::Value;
 use crate::error::{Error, Result};
 use crate::import::blob::{Blob, files, inside};
 use crate::import::capture::{
-    Along, At, CameraAxes, Capture, Depth, DepthAt, DepthCoding, ImageAt, Missing, Picture, PixelCoding, PoseAt, Poses,
+    At, CameraAxes, Capture, Depth, DepthAt, DepthCoding, ImageAt, Missing, Picture, PixelCoding, PoseAt, Poses,
     QuaternionOrder, RawPose, Turn, World,
 };
 use crate::import::optics::{Optics, from_corner};
@@ -317,16 +317,7 @@ fn depth(path: &Path, offset: f64, notes: &mut Vec<String>) -> Result<Option<Dep
         }
     }
     let Some(coding) = coding.filter(|_| !items.is_empty()) else { return Ok(None) };
-    Ok(Some(Depth {
-        coding,
-        along: Along::Z,
-        is_metric: true,
-        optics: None,
-        color_from_depth: None,
-        rays: None,
-        least_confidence: 0,
-        items,
-    }))
+    Ok(Some(Depth::of(coding, items)))
 }
 
 #[cfg(test)]

@@ -13,8 +13,8 @@ use crate::import::Options;
 use crate::import::axes::quaternion;
 use crate::import::blob::{Blob, Packing, entries, inside};
 use crate::import::capture::{
-    Along, At, ByteOrder, CameraAxes, Capture, Depth, DepthAt, DepthCoding, ImageAt, Picture, PoseAt, Poses,
-    QuaternionOrder, RawPose, Turn, World,
+    At, ByteOrder, CameraAxes, Capture, Depth, DepthAt, DepthCoding, ImageAt, Picture, PoseAt, Poses, QuaternionOrder,
+    RawPose, Turn, World,
 };
 use crate::import::optics::Optics;
 use crate::math::Vector;
@@ -168,16 +168,7 @@ fn coded(files: &Files, metadata: &Metadata, mut items: Vec<DepthAt>) -> Result<
             DepthCoding::RawF32 { width, height, order: ByteOrder::Little }
         }
     };
-    Ok(Some(Depth {
-        coding,
-        along: Along::Z,
-        is_metric: true,
-        optics: None,
-        color_from_depth: None,
-        rays: None,
-        least_confidence: LEAST_CONFIDENCE,
-        items,
-    }))
+    Ok(Some(Depth { least_confidence: LEAST_CONFIDENCE, ..Depth::of(coding, items) }))
 }
 
 /// LZFSE's blocks begin so.

@@ -12,8 +12,8 @@ use crate::error::{Error, Result};
 use crate::import::Options;
 use crate::import::blob::{Blob, beside};
 use crate::import::capture::{
-    Along, At, ByteOrder, CameraAxes, Capture, Depth, DepthAt, DepthCoding, HandAt, Hands, ImageAt, JointFrame,
-    Picture, PoseAt, Poses, RawPose, Turn, World,
+    At, ByteOrder, CameraAxes, Capture, Depth, DepthAt, DepthCoding, HandAt, Hands, ImageAt, JointFrame, Picture,
+    PoseAt, Poses, RawPose, Turn, World,
 };
 use crate::import::h5::{Hdf5, is_hdf5};
 use crate::import::joints::JointOrder;
@@ -132,14 +132,8 @@ fn depth(h5: &Hdf5, file: &Path, optics: Option<Optics>) -> Result<Option<Depth>
     });
     let (width, height) = (width as usize, height as usize);
     Ok(Some(Depth {
-        coding: DepthCoding::RawU16 { width, height, order: ByteOrder::Little, unit_m: 1e-3 },
-        along: Along::Z,
-        is_metric: true,
         optics,
-        color_from_depth: None,
-        rays: None,
-        least_confidence: 0,
-        items: items.collect(),
+        ..Depth::of(DepthCoding::RawU16 { width, height, order: ByteOrder::Little, unit_m: 1e-3 }, items.collect())
     }))
 }
 

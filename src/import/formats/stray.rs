@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::import::Options;
 use crate::import::blob::{Blob, files, inside};
 use crate::import::capture::{
-    Along, At, Capture, Depth, DepthAt, DepthCoding, ImageAt, Picture, PoseAt, Poses, RawPose, Turn, World,
+    At, Capture, Depth, DepthAt, DepthCoding, ImageAt, Picture, PoseAt, Poses, RawPose, Turn, World,
 };
 use crate::import::optics::Optics;
 use crate::import::text::{Lines, Table, cells};
@@ -86,14 +86,8 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
         poses: Some(Poses { items: poses, ..Poses::default() }),
         images,
         depth: (!depth.is_empty()).then_some(Depth {
-            coding: DepthCoding::Png16 { unit_m: 1e-3 },
-            along: Along::Z,
-            is_metric: true,
-            optics: None,
-            color_from_depth: None,
-            rays: None,
             least_confidence: LEAST_CONFIDENCE,
-            items: depth,
+            ..Depth::of(DepthCoding::Png16 { unit_m: 1e-3 }, depth)
         }),
         ..Capture::default()
     })

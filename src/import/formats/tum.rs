@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::import::Options;
 use crate::import::blob::{Blob, inside};
 use crate::import::capture::{
-    Along, At, Capture, Depth, DepthAt, DepthCoding, ImageAt, Picture, PoseAt, Poses, RawPose, Turn, World,
+    At, Capture, Depth, DepthAt, DepthCoding, ImageAt, Picture, PoseAt, Poses, RawPose, Turn, World,
 };
 use crate::import::optics::Optics;
 use crate::import::text::{Lines, cells};
@@ -61,16 +61,7 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
             .into_iter()
             .map(|(at, file)| DepthAt { at, blob: Blob::File(file), confidence: None, optics: None, pose: None })
             .collect();
-        capture.depth = Some(Depth {
-            coding: DepthCoding::Png16 { unit_m: 1.0 / DEPTH_PER_M },
-            along: Along::Z,
-            is_metric: true,
-            optics: None,
-            color_from_depth: None,
-            rays: None,
-            least_confidence: 0,
-            items,
-        });
+        capture.depth = Some(Depth::of(DepthCoding::Png16 { unit_m: 1.0 / DEPTH_PER_M }, items));
     }
     capture.optics = calibration(path, &capture)?;
     if capture.optics.is_none() {

@@ -1,4 +1,5 @@
-//! Hands against what is seen where they project to: a hand's own pixels where there are masks, else depth.
+//! Hands against what is seen where they project to: a hand's own pixels where there are masks, else depth, which tells a lag
+//! and a mirror image by what hands hide ([`super::hiding`]) and all else by being near.
 
 use nalgebra::Matrix3;
 use rayon::prelude::*;
@@ -6,31 +7,33 @@ use rayon::prelude::*;
 use super::agreement::student;
 use super::looks::Look;
 use super::reading::axes;
-use super::{Finding, Fix, LIKELY_NATS, Subject};
+use super::{Finding, Fix, LIKELY_NATS, Subject, hiding, sides};
 use crate::math::{Point, Pose, Vector, stats};
 use crate::recording::{Grid, HAND_CLASS};
 
-/// Masks that are decoded at the most: all of a short recording, else stretches, in which each hand meets the masks before and
-/// after its own.
+/// Masks that are decoded at the most: all of a short recording, else stretches of so many frames, in which each hand meets the
+/// masks before and after its own.
 const MASKS: usize = 200;
-const STRETCHES: usize = 5;
+const STRETCH: usize = 40;
 /// Differences of one frame that count as independent: a hand stays where it is for some frames.
 const INDEPENDENT: f64 = 0.25;
 /// Frames by which hands could be late or early at the most.
-const MOST_LAG: i64 = 15;
+pub(super) const MOST_LAG: i64 = 15;
 /// A lag below is harmless, frames.
-const LEAST_LAG: i64 = 4;
+pub(super) const LEAST_LAG: i64 = 4;
 /// The same in seconds, for fast cameras: a hand at work moves by a few centimetres in that time.
 pub(super) const HARMLESS_SECS: f64 = 0.15;
 /// Frames with a hand that are needed to judge.
-const LEAST: usize = 8;
+pub(super) const LEAST: usize = 8;
 /// What the best of some readings or lags gains by chance, nats: there are some 60 readings; neighbouring lags say the same.
 const CHANCE_NATS: f64 = 4.1;
-const LAG_NATS: f64 = 1.0;
+pub(super) const LAG_NATS: f64 = 1.0;
 /// Right hands are seen where they are more often than this.
-const RIGHT: f64 = 0.5;
+pub(super) const RIGHT: f64 = 0.5;
+/// Where hands are seen nearly as often as declared, they are right: chance moves the best of many.
+pub(super) const NEARLY: f64 = 0.7;
 /// Distances of a hand from the head, metres, with room for errors.
-const REACH_M: std::ops::Range<f64> = 0.05..2.5;
+pub(super) const REACH_M: std::ops::Range<f64> = 0.05..2.5;
 
 /// What one frame sees.
 enum Sight<'a> {
@@ -76,15 +79,21 @@ pub(super) fn depth_ratio(subject: &Subject, looks: &[Look]) -> Option<f64> {
 }
 
 /// Findings about hands under poses that are right.
-pub(super) fn judge(subject: &Subject, looks: &[Look]) -> Vec<Finding> {
+pub(super) fn judge(subject: &Subject, looks: &[Look]) -> Option<Finding> {
+    // A mirror image changes sides, too.
+    placed(subject, looks).or_else(|| sides::judge(subject))
+}
+
+/// What is wrong about where hands are.
+fn placed(subject: &Subject, looks: &[Look]) -> Option<Finding> {
     let witnesses = witnesses(subject, looks);
-    let mut out = Vec::new();
-    if witnesses.len() < LEAST {
-        return out;
-    }
     // Hands of another time are not where they are seen either: where a lag explains it, nothing else is asked.
-    out.extend(late(subject, &witnesses).or_else(|| misread(subject, &witnesses)));
-    out
+    if matches!(witnesses.first().map(|w| &w.sight), Some(Sight::Mask(_))) {
+        return late(subject, &witnesses).or_else(|| misread(subject, &witnesses));
+    }
+    let hiding = hiding::Hiding::of(subject);
+    let near = || (witnesses.len() >= LEAST).then(|| misread(subject, &witnesses)).flatten();
+    hiding.late().or_else(|| hiding.mirrored()).or_else(near)
 }
 
 /// Hands of a frame.
@@ -94,21 +103,23 @@ fn at<'a>(subject: &'a Subject, frame: usize) -> impl Iterator<Item = &'a Point>
 }
 
 /// Pixel and distance along the axis of a place; `None` outside of the image.
-fn projected(subject: &Subject, pose: &Pose, place: &Point) -> Option<(f64, f64, f64)> {
+pub(super) fn projected(subject: &Subject, pose: &Pose, place: &Point) -> Option<(f64, f64, f64)> {
     let p = pose.inverse() * place;
     let (u, v) = subject.camera.project(&p).filter(|(u, v)| subject.camera.contains(*u, *v))?;
     Some((u, v, p.z))
 }
 
+/// Whether a frame is within the largest lag of a hand.
+pub(super) fn is_near(subject: &Subject, frame: usize) -> bool {
+    let most = MOST_LAG.unsigned_abs() as usize;
+    let first = subject.hands.partition_point(|h| h.0 < frame.saturating_sub(most));
+    subject.hands.get(first).is_some_and(|h| h.0 <= frame.saturating_add(most))
+}
+
 /// Frames around hands with masks that show hands, else the looks.
 fn witnesses<'a>(subject: &Subject, looks: &'a [Look]) -> Vec<Witness<'a>> {
-    let near = |frame: &usize| {
-        let most = MOST_LAG.unsigned_abs() as usize;
-        let first = subject.hands.partition_point(|h| h.0 < frame.saturating_sub(most));
-        subject.hands.get(first).is_some_and(|h| h.0 <= frame.saturating_add(most))
-    };
-    let wanted: Vec<usize> = subject.with_mask.iter().copied().filter(near).collect();
-    let masks: Vec<Witness> = stretches(&wanted)
+    let wanted: Vec<usize> = subject.with_mask.iter().copied().filter(|&f| is_near(subject, f)).collect();
+    let masks: Vec<Witness> = stretches(&wanted, MASKS)
         .into_par_iter()
         .filter_map(|frame| Some(Witness { frame, sight: Sight::Mask((subject.mask)(frame)?) }))
         .collect();
@@ -117,18 +128,23 @@ fn witnesses<'a>(subject: &Subject, looks: &'a [Look]) -> Vec<Witness<'a>> {
     if masks.len() >= LEAST && 2 * masks.iter().filter(shows).count() > masks.len() {
         return masks;
     }
-    looks.iter().filter(|l| near(&l.frame)).map(|l| Witness { frame: l.frame, sight: Sight::Depth(l) }).collect()
+    looks
+        .iter()
+        .filter(|l| is_near(subject, l.frame))
+        .map(|l| Witness { frame: l.frame, sight: Sight::Depth(l) })
+        .collect()
 }
 
-/// All of a short list; of a long one evenly spread stretches.
-fn stretches(all: &[usize]) -> Vec<usize> {
-    if all.len() <= MASKS {
+/// All of a list that is not longer than `most`; of a longer one evenly spread stretches.
+pub(super) fn stretches(all: &[usize], most: usize) -> Vec<usize> {
+    if all.len() <= most {
         return all.to_vec();
     }
-    let length = MASKS / STRETCHES;
+    let count = (most / STRETCH).max(2);
+    let length = (most / count).min(all.len());
     let last = all.len() - length;
-    (0..STRETCHES)
-        .flat_map(|i| all.iter().skip(i * last / (STRETCHES - 1)).take(length))
+    (0..count)
+        .flat_map(|i| all.iter().skip(i * last / (count - 1)).take(length))
         .copied()
         .collect::<std::collections::BTreeSet<usize>>()
         .into_iter()
@@ -274,15 +290,9 @@ fn meanings() -> Vec<Meaning> {
             place: Box::new(move |p, _| p * factor),
         });
     }
-    for (name, flip) in [("x", 0), ("y", 1), ("z", 2)] {
-        let mut mirror = Vector::new(1.0, 1.0, 1.0);
-        mirror[flip] = -1.0;
-        out.push(Meaning {
-            what: format!("the hands are mirrored in the camera's {name}"),
-            remedy: format!("negate the hands' {name} in the camera's frame before they are moved into the world"),
-            fix: None,
-            place: Box::new(move |p, pose| pose * Point::from((pose.inverse() * p).coords.component_mul(&mirror))),
-        });
+    for axis in 0..3 {
+        let (what, remedy) = mirror_words(axis);
+        out.push(Meaning { what, remedy, fix: None, place: Box::new(move |p, pose| mirrored(p, pose, axis)) });
     }
     out.extend(axes().into_iter().skip(1).map(|turn: Matrix3<f64>| Meaning {
         what: format!("the hands are in a world of other axes: {}", world_words(&turn)),
@@ -291,6 +301,24 @@ fn meanings() -> Vec<Meaning> {
         place: Box::new(move |p, _| Point::from(turn * p.coords)),
     }));
     out
+}
+
+/// A place mirrored in an axis of the camera.
+pub(super) fn mirrored(place: &Point, pose: &Pose, axis: usize) -> Point {
+    let mut seen = pose.inverse() * place;
+    if let Some(coordinate) = seen.coords.get_mut(axis) {
+        *coordinate = -*coordinate;
+    }
+    pose * seen
+}
+
+/// What a mirror image is called, and what sets it right.
+pub(super) fn mirror_words(axis: usize) -> (String, String) {
+    let name = ["x", "y", "z"].get(axis).copied().unwrap_or("x");
+    (
+        format!("the hands are mirrored in the camera's {name}"),
+        format!("negate the hands' {name} in the camera's frame before they are moved into the world"),
+    )
 }
 
 /// Axes of a world in words.
@@ -305,12 +333,6 @@ fn world_words(turn: &Matrix3<f64>) -> String {
 
 /// Hands that come too late or too early, where masks show hands.
 fn late(subject: &Subject, witnesses: &[Witness]) -> Option<Finding> {
-    /// Where hands are seen nearly as often without a lag, there is none: chance moves the best lag.
-    const NEARLY: f64 = 0.7;
-    // Depth beside a hand is a door's or a wall's for as long as a lag is: it has named lags that were none.
-    if !matches!(witnesses.first().map(|w| &w.sight), Some(Sight::Mask(_))) {
-        return None;
-    }
     let now = shares(subject, witnesses, 0, 1.0, None);
     let (lag, best) = (-MOST_LAG..=MOST_LAG)
         .map(|lag| (lag, shares(subject, witnesses, lag, 1.0, None)))
@@ -320,22 +342,25 @@ fn late(subject: &Subject, witnesses: &[Witness]) -> Option<Finding> {
     if lag.abs() < LEAST_LAG || mean(&best) < RIGHT || mean(&now) > NEARLY * mean(&best) || gain < LIKELY_NATS {
         return None;
     }
+    let evidence = format!(
+        "{:.0} % {} at their own times, {:.0} % when shifted ({} frames)",
+        100.0 * mean(&now),
+        kind(witnesses),
+        100.0 * mean(&best),
+        witnesses.len()
+    );
+    told_lag(subject, lag, evidence, gain)
+}
+
+/// The words for hands of another time; `None` where the lag is too short to do harm.
+pub(super) fn told_lag(subject: &Subject, lag: i64, evidence: String, nats: f64) -> Option<Finding> {
     let secs = lag as f64 * period(&subject.secs);
-    if secs.abs() < HARMLESS_SECS {
-        return None;
-    }
     let word = if lag > 0 { "late" } else { "early" };
-    Some(Finding {
+    (secs.abs() >= HARMLESS_SECS).then(|| Finding {
         what: format!("the hands come {:.2} s ({} frames) too {word} for the images", secs.abs(), lag.abs()),
-        evidence: format!(
-            "{:.0} % {} at their own times, {:.0} % when shifted ({} frames)",
-            100.0 * mean(&now),
-            kind(witnesses),
-            100.0 * mean(&best),
-            witnesses.len()
-        ),
+        evidence,
         remedy: format!("subtract {secs:.2} s from the hands' times"),
-        nats: gain,
+        nats,
         // Narrations still find the hands, and most joints.
         ruinous: false,
         fix: Some(Fix::HandLag(lag)),

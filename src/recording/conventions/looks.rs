@@ -32,10 +32,12 @@ pub(super) struct Look {
 pub(super) fn looks(subject: &Subject) -> Vec<Look> {
     let area = (subject.camera.width * subject.camera.height).max(1);
     let most = (PIXELS / area).clamp(LEAST_FRAMES, FRAMES);
-    spread(&subject.with_depth, most)
-        .into_par_iter()
-        .filter_map(|frame| Some(look(frame, &(subject.depth)(frame)?, &subject.camera)))
-        .collect()
+    at(subject, &spread(&subject.with_depth, most))
+}
+
+/// Looks at these frames, in their order; frames whose depth cannot be read are left out.
+pub(super) fn at(subject: &Subject, frames: &[usize]) -> Vec<Look> {
+    frames.par_iter().filter_map(|&frame| Some(look(frame, &(subject.depth)(frame)?, &subject.camera))).collect()
 }
 
 /// At the most so many of a list, evenly spread, both ends among them.

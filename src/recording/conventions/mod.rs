@@ -4,19 +4,22 @@
 //! right reading of the numbers (direction, axes, order of a quaternion, unit, clock) is the one under which it does; how much
 //! more often it does than under the declared reading is the evidence. It needs no images, and depth that is off by a factor
 //! in each frame does no harm. Up is told by heads, which hardly roll, and by level surfaces, which are seen from above; hands by
-//! where they project to and what is seen there.
+//! where they project to and what is seen there: a hand's own pixels, or depth, in which a hand hides what is behind it where
+//! and while it is there. Which hand is the left one is told by frames that show both.
 
 mod agreement;
 mod gravity;
 mod hands;
+mod hiding;
 mod looks;
 mod poses;
 mod reading;
 mod repair;
+mod sides;
 
 use nalgebra::Matrix3;
 
-use super::{Camera, Grid, Recording};
+use super::{Camera, Grid, Recording, Side};
 use crate::math::{Point, Pose, Vector};
 pub use reading::{Reading, readings_of};
 pub use repair::repaired;
@@ -101,8 +104,8 @@ pub struct Subject<'a> {
     pub secs: Vec<f64>,
     /// The same poses under other readings of their numbers.
     pub readings: Vec<(Reading, Vec<Pose>)>,
-    /// Frame and place of each hand, world.
-    pub hands: Vec<(usize, Point)>,
+    /// Frame and place of each hand, world, and which it is said to be; by frame.
+    pub hands: Vec<(usize, Point, Side)>,
     /// Frames with depth, rising.
     pub with_depth: Vec<usize>,
     /// Frames with a mask, rising.
@@ -126,7 +129,7 @@ impl<'a> Subject<'a> {
             readings: readings_of(&poses),
             poses,
             secs: recording.frames.iter().map(|f| f.timestamp_secs).collect(),
-            hands: recording.hands.iter().map(|h| (h.frame, h.grasp())).collect(),
+            hands: recording.hands.iter().map(|h| (h.frame, h.grasp(), h.side)).collect(),
             // A reconstruction is in the world already: seen from the poses it agrees with itself.
             with_depth: having(&|f| f.files.depth.is_some()),
             with_mask: having(&|f| f.files.mask.is_some()),
