@@ -56,6 +56,7 @@ pub mod pipeline;
 
 pub mod fitting;
 
+pub mod appearance;
 pub mod evaluation;
 pub mod export;
 pub mod validation;
