@@ -96,10 +96,16 @@ fn touched_by(sight: &Sight, edge: f32, reach: f32) -> Vec<Index> {
     // From one sample to the next the surface goes on by half a block at the most, where it is not slanted much.
     let focal = lens.focal[0].min(lens.focal[1]);
     let stride = ((0.5 * edge * focal / farthest) as usize).clamp(1, 8);
-    // Along the ray no block between is left out.
-    let steps = (2.0 * reach / edge).ceil().max(1.0) as usize;
+    // Along the ray, no block between left out; and a cell to all sides, as a surface seen edge-on goes along the ray.
+    let steps = (4.0 * reach / edge).ceil().max(2.0) as usize;
+    let aside = 1.5 * edge / SIDE as f32;
+    let sides = [Local::x(), Local::y(), Local::z()].into_iter().flat_map(|axis| [axis * aside, -axis * aside]);
+    let places: Vec<(f32, Local)> = (0..=steps)
+        .map(|i| ((2.0 * i as f32 / steps as f32 - 1.0) * reach, Local::zeros()))
+        .chain(sides.map(|side| (0.0, side)))
+        .collect();
     let mut out: Vec<Index> = Vec::new();
-    let mut before: Vec<Index> = vec![[i32::MAX; 3]; steps + 1];
+    let mut before: Vec<Index> = vec![[i32::MAX; 3]; places.len()];
     for y in (0..lens.height).step_by(stride) {
         for x in (0..lens.width).step_by(stride) {
             let index = y * lens.width + x;
@@ -107,9 +113,8 @@ fn touched_by(sight: &Sight, edge: f32, reach: f32) -> Vec<Index> {
             if depth == 0.0 || sight.slant(index) == 0.0 {
                 continue;
             }
-            for (i, last) in before.iter_mut().enumerate() {
-                let along = 2.0 * i as f32 / steps as f32 - 1.0;
-                let p = sight.point(x, y, depth + along * reach) / edge;
+            for ((along, side), last) in places.iter().zip(&mut before) {
+                let p = (sight.point(x, y, depth + along) + side) / edge;
                 if !p.iter().all(|c| c.abs() < FAR) {
                     continue;
                 }
@@ -137,7 +142,7 @@ fn integrated(index: Index, sights: &[Sight], voxel: f32, reach: f32) -> Option<
     let mut any = false;
     for sight in sights {
         let center = sight.pose.apply(&middle);
-        if !sight.lens.meets(&center, radius) || hidden(sight, &center, radius + reach) {
+        if !sight.lens.meets(&center, radius) || sight.hides(&center, radius + reach) {
             continue;
         }
         any |= add(sight, &corner, voxel, reach, &mut voxels);
@@ -149,22 +154,6 @@ fn integrated(index: Index, sights: &[Sight], voxel: f32, reach: f32) -> Option<
         v[0] /= v[1];
     }
     Some(Block { index, voxels })
-}
-
-/// Whether what is seen at the middle of a block stands well before all of it.
-fn hidden(sight: &Sight, center: &Local, radius: f32) -> bool {
-    /// Beside what hides the middle the block may be seen: only what stands far before it counts.
-    const BEFORE_M: f32 = 0.3;
-    if center.z <= radius {
-        return false;
-    }
-    let [u, v] = sight.lens.project(center).map(|c| c + 0.5);
-    if !(u >= 0.0 && v >= 0.0 && u < sight.lens.width as f32 && v < sight.lens.height as f32) {
-        return false;
-    }
-    let depth = sight.depth(v as usize * sight.lens.width + u as usize);
-    // From far away a block is a few pixels: its middle stands for it.
-    depth > 0.0 && depth < center.z - radius - BEFORE_M
 }
 
 /// Adds a frame's weighted distances to the sums of a block's voxels; whether any was told something.

@@ -42,10 +42,10 @@ impl Mesh {
     }
 }
 
-/// A block's corners and cells.
+/// A block's cells.
 struct Cells {
-    /// Of the voxels of the block and the next ones: distance, not a number where it is not known.
-    corners: Vec<f32>,
+    /// Of the voxels of the block and the next ones: whether they are known to be inside.
+    inside: Vec<bool>,
     vertices: Vec<Local>,
     /// Vertex of each cell.
     table: Vec<u16>,
@@ -84,6 +84,7 @@ fn neighbours(volume: &Volume, index: &Index, offset: i32) -> [Option<usize>; 8]
     })
 }
 
+/// Distances at the voxels of a block and the next ones; not a number where they are not known.
 fn corners(volume: &Volume, block: usize) -> Vec<f32> {
     let next = neighbours(volume, &volume.blocks[block].index, 1);
     let mut out = vec![f32::NAN; CORNERS * CORNERS * CORNERS];
@@ -124,7 +125,8 @@ fn cells(volume: &Volume, block: usize) -> Option<Cells> {
         *vertex = vertices.len() as u16;
         vertices.push(volume.place(place));
     }
-    (!vertices.is_empty()).then_some(Cells { corners, vertices, table })
+    let inside = corners.iter().map(|distance| *distance < 0.0).collect();
+    (!vertices.is_empty()).then_some(Cells { inside, vertices, table })
 }
 
 /// Where in a cell (0 to 1 along each axis) the surface runs: the mean of where it meets the edges. `None` where it does not,
@@ -159,10 +161,9 @@ fn quads(volume: &Volume, block: usize, own: &Cells, vertex: &dyn Fn(usize, usiz
     let mut out = Vec::new();
     for cell in (0..COUNT).filter(|&cell| own.table[cell] != NONE) {
         let at = [cell % SIDE, cell / SIDE % SIDE, cell / (SIDE * SIDE)];
-        let here = own.corners[corner_of(cell, 0)];
+        let here = own.inside[corner_of(cell, 0)];
         for axis in 0..3 {
-            let there = own.corners[corner_of(cell, 1 << axis)];
-            if (here < 0.0) == (there < 0.0) {
+            if here == own.inside[corner_of(cell, 1 << axis)] {
                 continue;
             }
             let (b, c) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -181,7 +182,7 @@ fn quads(volume: &Volume, block: usize, own: &Cells, vertex: &dyn Fn(usize, usiz
             // Around the axis by the right-hand rule: seen from its positive end.
             if let (Some(v0), Some(v1), Some(v2), Some(v3)) = (back(&[b, c]), back(&[c]), back(&[]), back(&[b])) {
                 // Outside is where the distance is positive.
-                out.push(if here < 0.0 { [v0, v1, v2, v3] } else { [v3, v2, v1, v0] });
+                out.push(if here { [v0, v1, v2, v3] } else { [v3, v2, v1, v0] });
             }
         }
     }

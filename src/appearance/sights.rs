@@ -133,6 +133,21 @@ impl Sight {
         Some(1.0 - 0.75 * off / tolerance)
     }
 
+    /// Whether what is seen at the middle of a ball (camera frame) stands far before all of it.
+    pub(super) fn hides(&self, middle: &Local, radius: f32) -> bool {
+        /// What stands nearer may hide the middle alone.
+        const BEFORE_M: f32 = 0.3;
+        if middle.z <= radius.max(NEAREST_M) {
+            return false;
+        }
+        let [u, v] = self.lens.project(middle).map(|c| c + 0.5);
+        if !(u >= 0.0 && v >= 0.0 && u < self.lens.width as f32 && v < self.lens.height as f32) {
+            return false;
+        }
+        let depth = self.depth(v as usize * self.lens.width + u as usize);
+        depth > 0.0 && depth < middle.z - radius - BEFORE_M
+    }
+
     /// The local point at a sample of this depth.
     pub(super) fn point(&self, x: usize, y: usize, z: f32) -> Local {
         let [fx, fy] = self.lens.focal;
@@ -199,7 +214,7 @@ fn sight(setting: &Setting, frame: usize, hidden: &[bool; 256]) -> Result<Option
         let joint = scene.joints.iter().position(|j| j.id == piece.part.id);
         joint.and_then(|i| setting.timelines.get(i)).map_or(State::Closed, |t| t.at(from.timestamp_secs))
     });
-    let states = states.collect();
+    let states: Vec<State> = states.collect();
     let mut sight = Sight { frame, step, lens, pose, states, samples: Vec::new() };
     without_arms(setting, &sight, &world_from_camera, &mut z);
     sight.samples = z

@@ -124,7 +124,7 @@ fn in_cubes(mesh: &Mesh, budget: usize) -> Mesh {
             let fast: Vec<bool> = vertices.iter().map(|&v| shared[v as usize]).collect();
             let most = (list.len() as f64 * share) as usize;
             let mut reduced = passes(part, &fast, most);
-            let names = vertices.iter().zip(&fast).map(|(&v, fast)| fast.then_some(v)).collect();
+            let names: Vec<Option<u32>> = vertices.iter().zip(&fast).map(|(&v, fast)| fast.then_some(v)).collect();
             reduced.triangles.shrink_to_fit();
             (reduced, names)
         })

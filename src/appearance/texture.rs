@@ -58,6 +58,11 @@ pub(super) struct Tile {
     pub(super) chart: usize,
     middle: Local,
     radius: f32,
+    /// Mean normal, and the angle within which all of them are, radians.
+    normal: Local,
+    spread: f32,
+    /// The least score that any of its texels has kept.
+    least: u16,
     pub(super) texels: Vec<Texel>,
 }
 
@@ -192,7 +197,11 @@ fn tiles_of(number: usize, chart: &Chart) -> Vec<Tile> {
         let places: Vec<Local> = texels.iter().map(|t| place(chart, t)).collect();
         let middle = places.iter().fold(Local::zeros(), |sum, p| sum + p) / places.len().max(1) as f32;
         let radius = places.iter().map(|p| (p - middle).norm()).fold(0.0, f32::max);
-        Tile { chart: number, middle, radius, texels }
+        let normals: Vec<Local> = texels.iter().map(|t| Local::from(t.normal.map(f32::from)) / 127.0).collect();
+        let sum = normals.iter().fold(Local::zeros(), |sum, n| sum + n);
+        let normal = sum.try_normalize(1e-6).unwrap_or(chart.axes[2]);
+        let spread = normals.iter().map(|n| n.dot(&normal).clamp(-1.0, 1.0).acos()).fold(0.0, f32::max);
+        Tile { chart: number, middle, radius, normal, spread, least: 0, texels }
     };
     tiles.into_iter().filter(|t| !t.is_empty()).map(whole).collect()
 }
@@ -256,7 +265,7 @@ fn look_at(tile: &mut Tile, chart: &Chart, view: &View) {
         },
     };
     let middle = pose.apply(&tile.middle);
-    if !sight.lens.meets(&middle, tile.radius) {
+    if !sight.lens.meets(&middle, tile.radius) || no_use(tile, &pose, &middle, view) {
         return;
     }
     let off = if chart.owner.is_some() { PART_OFF } else { ROOM_OFF };
@@ -285,13 +294,36 @@ fn look_at(tile: &mut Tile, chart: &Chart, view: &View) {
         let score = view.sharpness * cosine * cosine * agreement * (20.0 * rim).clamp(0.1, 1.0) / (near * near);
         keep(texel, score, view, at);
     }
+    let kept = tile.texels.iter().flat_map(|t| &t.samples).map(|s| s.score);
+    tile.least = kept.min().unwrap_or(0);
+}
+
+/// Whether a view has nothing to say of a tile: it looks away, is hidden, or all of its texels have better ones.
+fn no_use(tile: &Tile, pose: &Motion, middle: &Local, view: &View) -> bool {
+    let away = middle.norm();
+    if away <= 2.0 * tile.radius {
+        return false;
+    }
+    // Angle between the normal that turns most towards the camera and the ray that meets it best.
+    let cosine = -(pose.rotation * tile.normal).dot(middle) / away;
+    let angle = cosine.clamp(-1.0, 1.0).acos() - tile.spread - (tile.radius / away).asin();
+    let best = angle.max(0.0).cos();
+    let near = (middle.z - tile.radius).max(SHARP_M);
+    best < LEAST_COSINE
+        || ranked(view.sharpness * best * best / (near * near)) <= tile.least
+        || view.sight.hides(middle, tile.radius)
+}
+
+/// A score as samples keep it.
+fn ranked(score: f32) -> u16 {
+    /// The best score, of a sharp image seen from [`SHARP_M`], is about 11; its root times this fits into 16 bits.
+    const SCALE: f32 = 16_000.0;
+    (score.sqrt() * SCALE).clamp(1.0, 65_535.0) as u16
 }
 
 /// Keeps a sample if it is among the best.
 fn keep(texel: &mut Texel, score: f32, view: &View, at: [f32; 2]) {
-    /// The best score, of a sharp image seen from [`SHARP_M`], is about 11; its root times this fits into 16 bits.
-    const SCALE: f32 = 16_000.0;
-    let score = (score.sqrt() * SCALE).clamp(1.0, 65_535.0) as u16;
+    let score = ranked(score);
     let Some(worst) = texel.samples.iter_mut().min_by_key(|s| s.score) else { return };
     if worst.score >= score {
         return;
