@@ -167,15 +167,24 @@ pub(super) fn load(setting: &Setting, frames: &[usize]) -> Result<Vec<Sight>> {
 
 /// Mask classes of hands and people.
 fn hidden_classes(recording: &Recording) -> [bool; 256] {
-    const PEOPLE: [&str; 10] =
-        ["hand", "hands", "arm", "arms", "person", "people", "human", "finger", "fingers", "man"];
     let mut hidden = [false; 256];
     hidden[usize::from(HAND_CLASS)] = true;
     for (class, name) in &recording.labels {
-        let name = name.to_lowercase();
-        hidden[usize::from(*class)] |= name.split(|c: char| !c.is_alphabetic()).any(|word| PEOPLE.contains(&word));
+        hidden[usize::from(*class)] |= is_of_person(name);
     }
     hidden
+}
+
+/// Whether a class is of a person: "left hand", not "hand towel".
+fn is_of_person(name: &str) -> bool {
+    const PEOPLE: [&str; 12] = [
+        "hand", "hands", "arm", "arms", "forearm", "forearms", "finger", "fingers", "person", "people", "human",
+        "wearer",
+    ];
+    const BESIDE: [&str; 6] = ["left", "right", "camera", "the", "of", "s"];
+    let name = name.to_lowercase();
+    let words = || name.split(|c: char| !c.is_alphabetic()).filter(|word| !word.is_empty());
+    words().any(|word| PEOPLE.contains(&word)) && words().all(|word| PEOPLE.contains(&word) || BESIDE.contains(&word))
 }
 
 fn sight(setting: &Setting, frame: usize, hidden: &[bool; 256]) -> Result<Option<Sight>> {
@@ -359,6 +368,15 @@ fn without_parts(setting: &Setting, sight: &mut Sight) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn hands_are_of_a_person_and_hand_towels_are_not() {
+        for (name, expected) in
+            [("left_hand", true), ("Person", true), ("hand towel", false), ("armchair", false), ("left", false)]
+        {
+            assert_eq!(is_of_person(name), expected, "{name}");
+        }
+    }
 
     #[test]
     fn a_mark_grows_to_a_square() {
