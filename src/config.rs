@@ -1,10 +1,13 @@
 //! Every number that can be chosen: the paper's hyperparameters (§B.1, the defaults) and what the paper leaves open.
 
+mod values;
+
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
+use values::{overlay, sensible};
 
 /// One configurable value, for `paws config` and for the docs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -310,6 +313,38 @@ block! {
 }
 
 block! {
+    /// Textured surfaces, for eyes alone (ours).
+    Appearance, "appearance", {
+        /// Frames that the room is fused from and textured with, spread over viewpoints; frames in which all is closed first. More
+        /// of them see next to nothing new in one kitchen.
+        frames: usize = 150, "frames", "ours";
+        /// Frames for each part that show it standing open: its back, and what is behind it.
+        open_frames: usize = 8, "frames", "ours";
+        /// Depth beyond this is left out: estimates are worth less there than the fused surface is thick.
+        depth_max_m: f64 = 5.0, "m", "ours";
+        /// Edge of a voxel. It grows where the scene would not fit into `fuse_mb`.
+        voxel_m: f64 = 0.01, "m", "ours";
+        /// Depth counts within this distance of the surface that it shows: twice the noise of estimated depth. At least three
+        /// voxels.
+        truncation_m: f64 = 0.04, "m", "ours";
+        /// Memory for voxels; 60 m^2 of surface at a centimetre take about half of it.
+        fuse_mb: f64 = 500.0, "MB", "ours";
+        /// What is nearer than this to fingertips, or to the forearm that they belong to, is a person.
+        hand_m: f64 = 0.12, "m", "ours";
+        /// What is seen nearer than this to a part's boards is the part and not the room: what fronts and depth are off by.
+        slab_m: f64 = 0.05, "m", "ours";
+        /// Pieces of surface that hang together with nothing and are smaller are noise: a hand's breadth by two.
+        shard_m2: f64 = 0.02, "m^2", "ours";
+        /// Triangles of the room.
+        triangles: usize = 200_000, "triangles", "ours";
+        /// Edge of a texel: a pixel of a VGA camera at a metre and a half. It grows where `texels` would not suffice.
+        texel_m: f64 = 0.004, "m", "ours";
+        /// Texels of all surfaces together: half of a page of 4096 x 4096.
+        texels: usize = 8_000_000, "texels", "ours";
+    }
+}
+
+block! {
     /// The hand in the simulation, and what counts as explained (ours).
     Validation, "validation", {
         /// Step of the simulation.
@@ -365,6 +400,8 @@ pub struct Config {
     pub inference: Inference,
     /// Ours.
     pub fitting: Fitting,
+    /// Ours.
+    pub appearance: Appearance,
     /// Ours.
     pub validation: Validation,
 }
@@ -438,6 +475,7 @@ impl Config {
         self.reasoning.rows(&mut rows);
         self.inference.rows(&mut rows);
         self.fitting.rows(&mut rows);
+        self.appearance.rows(&mut rows);
         self.validation.rows(&mut rows);
         rows
     }
@@ -491,43 +529,6 @@ impl Config {
             return Err("localization.min_views is above local_frames: no voxel could ever be confident".to_owned());
         }
         Ok(())
-    }
-}
-
-/// Puts a file's values over others, table by table.
-fn overlay(under: &mut toml::Table, over: toml::Table) {
-    for (key, value) in over {
-        match (under.get_mut(&key), value) {
-            (Some(toml::Value::Table(under)), toml::Value::Table(over)) => overlay(under, over),
-            (_, value) => {
-                under.insert(key, value);
-            }
-        }
-    }
-}
-
-/// Bounds beyond which a value is a slip of the hand, and would cost memory or time without end.
-fn sensible(row: &Row) -> [f64; 2] {
-    match (row.key.as_str(), row.unit) {
-        ("fitting.clearance_m" | "fitting.board_m", _) => [1e-4, 0.1],
-        ("fitting.cell_m" | "localization.voxel_m", _) => [2e-3, 1.0],
-        ("fitting.carcass_depth_m", _) => [0.15, 5.0],
-        ("fitting.room_voxel_m", _) => [0.02, 1.0],
-        ("validation.step_secs", _) => [1e-4, 0.02],
-        // Less would take the evidence for better than independent.
-        ("reasoning.evidence_temperature" | "inference.shared_errors", _) => [1.0, 100.0],
-        // More is a veto.
-        ("validation.refuted_nats", _) => [1e-3, 20.0],
-        (_, "share") => [1e-9, 1.0 - 1e-9],
-        (_, "m") => [1e-4, 100.0],
-        (_, "s") => [1e-3, 100.0],
-        (_, "deg") => [1e-2, 180.0],
-        ("reasoning.vlm_lines_per_view", _) => [1.0, 9.0],
-        (_, "px" | "frames" | "views" | "samples" | "lines" | "boxes") => [1.0, 1e4],
-        (_, "tokens") => [1.0, 1e5],
-        ("geometry.normals_per_frame", _) => [100.0, 1e6],
-        (_, "-") => [1e-3, 1e4],
-        _ => [1e-6, 1e6],
     }
 }
 

@@ -11,7 +11,8 @@
 //! ```
 //!
 //! [`pipeline::infer`] runs the paper and keeps every intermediate result; [`feedback::weighed`] asks physics about joints
-//! in doubt; [`fitting::fit`] builds the twin; [`validation::validate`] replays the recorded hands; [`export`] writes it.
+//! in doubt; [`fitting::fit`] builds the twin, [`appearance::look`] its surfaces; [`validation::validate`] replays the recorded
+//! hands; [`export`] writes it.
 //!
 //! | paper | here |
 //! |---|---|
@@ -56,6 +57,7 @@ pub mod pipeline;
 
 pub mod fitting;
 
+pub mod appearance;
 pub mod evaluation;
 pub mod export;
 pub mod validation;

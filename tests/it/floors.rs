@@ -17,7 +17,7 @@ const FLOORS: [&[&str]; 17] = [
     &["inference"],
     &["pipeline"],
     &["fitting"],
-    &["export", "validation", "evaluation"],
+    &["appearance", "export", "validation", "evaluation"],
     &["feedback"],
     &["report"],
     &["cli"],

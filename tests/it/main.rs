@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "a test that fails should say so at once")]
 
 mod accuracy;
+mod appearance;
 mod articulations;
 mod bad_input;
 mod bare_trajectories;
