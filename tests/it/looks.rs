@@ -72,12 +72,9 @@ fn look() -> Look {
     let picture =
         |name: &str, colour: [u8; 3]| Texture { name: name.to_owned(), width: 4, height: 4, rgb: colour.repeat(16) };
     let floor = quad([[-2.0, -2.0, 0.0], [2.0, -2.0, 0.0], [2.0, 2.0, 0.0], [-2.0, 2.0, 0.0]], 0);
-    let mut corner = quad([[-2.0, 2.0, 0.0], [2.0, 2.0, 0.0], [2.0, 2.0, 2.0], [-2.0, 2.0, 2.0]], 0);
+    let behind = quad([[-2.0, 2.0, 0.0], [2.0, 2.0, 0.0], [2.0, 2.0, 2.0], [-2.0, 2.0, 2.0]], 0);
     let aside = quad([[-2.0, -2.0, 0.0], [-2.0, 2.0, 0.0], [-2.0, 2.0, 2.0], [-2.0, -2.0, 2.0]], 0);
-    corner.triangles.extend(aside.triangles.iter().map(|t| t.map(|v| v + 4)));
-    corner.positions.extend(aside.positions);
-    corner.normals.extend(aside.normals);
-    corner.uv.extend(aside.uv);
+    let corner = joined(behind, aside);
     let door = quad([[-0.3, -0.02, 0.6], [0.3, -0.02, 0.6], [0.3, -0.02, 1.4], [-0.3, -0.02, 1.4]], 1);
     Look {
         textures: vec![picture("atlas_0", [200, 40, 40]), picture("atlas_1", [40, 200, 40])],
@@ -90,24 +87,67 @@ fn files() -> BTreeMap<String, Vec<u8>> {
     dress::files(&twin(), &look()).unwrap().into_iter().collect()
 }
 
-fn written(dir: &Path) {
-    let (twin, look) = (twin(), look());
-    let look = Some(&look);
-    let mut all = files();
+/// All files of a twin with a look.
+fn write_all(dir: &Path, twin: &Twin, look: &Look, verdicts: &[(String, String)]) {
+    let mut all: BTreeMap<String, Vec<u8>> = dress::files(twin, look).unwrap().into_iter().collect();
+    let look = Some(look);
     let mut add = |name: &str, bytes: Vec<u8>| all.insert(name.to_owned(), bytes);
-    add("scene.urdf", export::urdf::write(&twin, look).unwrap().into_bytes());
-    add("scene.xml", export::mjcf::write(&twin, look).unwrap().into_bytes());
-    add("kitchen.xml", export::mjcf::write_model(&twin, look).unwrap().into_bytes());
-    add("scene.glb", export::gltf::write(&twin, look, &[]).unwrap());
-    add("physics.glb", export::gltf::write_physics(&twin).unwrap());
-    add("scene.usda", export::usd::write(&twin, look).unwrap().into_bytes());
-    add("scene.usdz", export::usd::write_package(&twin, look).unwrap());
-    add("twin.json", paws_twin::json::text(&twin).unwrap().into_bytes());
+    add("scene.urdf", export::urdf::write(twin, look).unwrap().into_bytes());
+    add("scene.xml", export::mjcf::write(twin, look).unwrap().into_bytes());
+    add("kitchen.xml", export::mjcf::write_model(twin, look).unwrap().into_bytes());
+    add("scene.glb", export::gltf::write(twin, look, verdicts).unwrap());
+    add("physics.glb", export::gltf::write_physics(twin).unwrap());
+    add("scene.usda", export::usd::write(twin, look).unwrap().into_bytes());
+    add("scene.usdz", export::usd::write_package(twin, look).unwrap());
+    add("twin.json", paws_twin::json::text(twin).unwrap().into_bytes());
     for (name, bytes) in all {
         let path = dir.join(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(path, bytes).unwrap();
     }
+}
+
+/// Gives the twin of a folder that `paws twin` wrote a look: its own boxes, and a flat floor.
+pub fn dress_up(folder: &Path) {
+    let twin: Twin = paws_twin::json::read(&folder.join("twin.json")).unwrap();
+    let validation: paws_twin::validation::Validation = paws_twin::json::read(&folder.join("validation.json")).unwrap();
+    if folder.join("look").exists() {
+        std::fs::remove_dir_all(folder.join("look")).unwrap();
+    }
+    let boxes = |solids: &[Solid]| solids.iter().flat_map(|s| sides(&s.shape)).collect::<Vec<_>>();
+    let fixed: Vec<Solid> = twin.furniture.iter().flat_map(|f| &f.carcass).chain(&twin.room).cloned().collect();
+    let mut dressed = look();
+    dressed.room.truncate(1);
+    dressed.room.extend(boxes(&fixed).into_iter().reduce(joined));
+    dressed.parts = twin
+        .furniture
+        .iter()
+        .map(|f| (f.part.id.clone(), boxes(&f.part.solids).into_iter().reduce(joined).into_iter().collect()))
+        .collect();
+    write_all(folder, &twin, &dressed, &validation.words());
+}
+
+/// Two meshes as one.
+fn joined(mut a: TexturedMesh, b: TexturedMesh) -> TexturedMesh {
+    let first = u32::try_from(a.positions.len()).unwrap();
+    a.triangles.extend(b.triangles.iter().map(|t| t.map(|v| v + first)));
+    a.positions.extend(b.positions);
+    a.normals.extend(b.normals);
+    a.uv.extend(b.uv);
+    a
+}
+
+/// The six sides of a box.
+fn sides(b: &OrientedBox) -> Vec<TexturedMesh> {
+    let corner = |axis: usize, sign: f64, along: f64, across: f64| -> [f64; 3] {
+        let mut local = Vector::zeros();
+        (local[axis], local[(axis + 1) % 3], local[(axis + 2) % 3]) = (sign, along * sign, across);
+        (b.center + b.rotation * local.component_mul(&b.half)).coords.into()
+    };
+    let side = |axis: usize, sign: f64| {
+        quad([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(u, v)| corner(axis, sign, u, v)), 1)
+    };
+    (0..3).flat_map(|axis| [side(axis, -1.0), side(axis, 1.0)]).collect()
 }
 
 #[test]
@@ -297,7 +337,7 @@ fn a_look_that_cannot_be_shown_is_refused_with_its_place() {
 #[test]
 fn the_look_of_a_twins_folder_is_exported_again_byte_for_byte() {
     let dir = tempfile::tempdir().unwrap();
-    written(&dir.path().join("made"));
+    write_all(&dir.path().join("made"), &twin(), &look(), &[]);
     let out = crate::common::paws(&["export", "made", "--out", "again"], dir.path());
     assert!(out.status.success(), "{}", crate::common::stderr(&out));
     let mut expected: Vec<String> = files().into_keys().collect();
@@ -320,7 +360,7 @@ fn the_look_of_a_twins_folder_is_exported_again_byte_for_byte() {
 #[test]
 fn what_is_checked_of_a_dressed_twin_is_what_is_checked_of_a_bare_one() {
     let dir = tempfile::tempdir().unwrap();
-    written(&dir.path().join("made"));
+    write_all(&dir.path().join("made"), &twin(), &look(), &[]);
     let bare = crate::common::paws(&["export", "made", "--no-textures", "--out", "bare"], dir.path());
     assert!(bare.status.success());
     for name in ["scene.urdf", "scene.xml", "kitchen.xml", "scene.glb"] {
