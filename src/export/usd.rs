@@ -361,11 +361,11 @@ fn meshes(out: &mut Usda, pieces: &[Piece]) {
         out.line(&format!("int[] faceVertexIndices = [{}]", numbers.join(",")));
         let material = dress::material(piece.texture);
         out.line(&format!("rel material:binding = </{ROOT}/{MATERIALS}/{material}>"));
-        let metadata = |interpolation: &str| format!("(interpolation = \"{interpolation}\")");
-        out.line(&format!("normal3f[] normals = {} {}", tuples(piece.normals.iter().map(three)), metadata("vertex")));
+        let each = "(interpolation = \"vertex\")";
+        out.line(&format!("normal3f[] normals = {} {each}", tuples(piece.normals.iter().map(three))));
         out.line(&format!("point3f[] points = {}", tuples(piece.positions.iter().map(three))));
         let st = piece.uv.iter().map(|[u, v]| [dress::share_text(*u, false), dress::share_text(*v, true)]);
-        out.line(&format!("texCoord2f[] primvars:st = {} {}", tuples(st), metadata("vertex")));
+        out.line(&format!("texCoord2f[] primvars:st = {} {each}", tuples(st)));
         out.line("uniform token subdivisionScheme = \"none\"");
         out.close();
     }
