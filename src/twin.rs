@@ -295,7 +295,7 @@ pub fn mass_properties(solids: &[Solid], density: f64) -> Option<MassProperties>
 }
 
 /// A home is smaller, and single precision still tells millimetres there.
-const FAR_M: f64 = 1e3;
+pub(crate) const FAR_M: f64 = 1e3;
 
 fn is_rotation(m: &Matrix3<f64>) -> bool {
     (m.transpose() * m - Matrix3::identity()).norm() < 1e-6 && m.determinant() > 0.0

@@ -18,7 +18,7 @@ use paws_twin::import::formats::{self, Format};
 use paws_twin::model::{self, check, furniture};
 use paws_twin::reasoning::answers;
 use paws_twin::recording::trajectory::{self, LengthUnit};
-use paws_twin::recording::{images, narration, segments, AtWork, Camera, Clip, Recording};
+use paws_twin::recording::{AtWork, Camera, Clip, Recording, images, narration, segments};
 use paws_twin::twin::Twin;
 use paws_twin::vlm::absent::{DryRun, Replay};
 use paws_twin::vlm::store::Stored;
@@ -191,9 +191,9 @@ fn truth(files: &mut Files, bytes: &[u8]) {
 fn twin(files: &mut Files, bytes: &[u8]) {
     let Some(twin) = told(json::read::<Twin>(&files.put("twin.json", bytes))) else { return };
     told(export::check(&twin));
-    told(export::urdf::write(&twin));
-    told(export::mjcf::write(&twin));
-    told(export::usd::write(&twin));
+    told(export::urdf::write(&twin, None));
+    told(export::mjcf::write(&twin, None));
+    told(export::usd::write(&twin, None));
     told(export::gltf::write_physics(&twin));
 }
 

@@ -13,6 +13,9 @@ pub struct DemoArgs {
     /// Folder for the recording (kitchen/) and its twin (twin/)
     #[arg(long, value_name = "DIR", default_value = "demo")]
     out: PathBuf,
+    /// Leave the furniture and the room the plain boxes that they collide as
+    #[arg(long)]
+    no_textures: bool,
 }
 
 /// The demo's kitchen: the seed says which.
@@ -24,5 +27,6 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Answer> {
     super::synth::write(&crate::synth::Options { seed: SEED, width: 480, parts: 6, ..Default::default() }, &recording)?;
     eprintln!("making its twin ...");
     let given = twin::Given { recording: &recording, opening: Opening::default(), door: Door::default() };
-    twin::make(given, &twin, &Config::default(), true, None)
+    let wishes = twin::Wishes { steps: true, textures: !args.no_textures };
+    twin::make(given, &twin, &Config::default(), wishes, None)
 }

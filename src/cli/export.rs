@@ -8,11 +8,12 @@ use rayon::prelude::*;
 
 use super::joints::{JointArgs, is_joints};
 use super::output::{restore, write_file};
-use super::{Answer, print, shown};
+use super::{Answer, look, print, shown};
 use crate::evaluation::Predictions;
 use crate::export::annotations::{self, Shown};
 use crate::import::ply::Cloud;
 use crate::import::{articulations, ply};
+use crate::look::Look;
 use crate::validation::Validation;
 use crate::{export, json, twin::Twin};
 
@@ -27,7 +28,7 @@ pub enum Format {
     Gltf,
     /// Binary glTF 2.0 with KHR_physics_rigid_bodies, for engines
     GltfPhysics,
-    /// OpenUSD text with UsdPhysics, for Isaac
+    /// OpenUSD with UsdPhysics, for Isaac: as text, and with its pictures as one file
     Usd,
     /// Arti4D's list of joints (arti4d.json)
     Arti4d,
@@ -48,8 +49,11 @@ pub struct ExportArgs {
     format: Vec<Format>,
     #[command(flatten)]
     joints: JointArgs,
-    /// Folder for scene.urdf, scene.xml, kitchen.xml, scene.glb, physics.glb, scene.usda; and for twin.json where joints
-    /// were given
+    /// Leave out what the twin looks like, which is read from the folder that `paws twin` wrote
+    #[arg(long)]
+    no_textures: bool,
+    /// Folder for scene.urdf, scene.xml, kitchen.xml, scene.glb, physics.glb, scene.usda, scene.usdz, look/; and for
+    /// twin.json where joints were given
     #[arg(long, value_name = "DIR", default_value = ".")]
     out: PathBuf,
 }
@@ -97,7 +101,14 @@ fn kind_of(path: &Path) -> anyhow::Result<Given> {
 }
 
 /// A file's name and contents.
-type File = (&'static str, Vec<u8>);
+type File = (String, Vec<u8>);
+
+impl Format {
+    /// Whether its files show the meshes and pictures beside them.
+    fn needs_look(self) -> bool {
+        matches!(self, Self::Urdf | Self::Mjcf | Self::Usd)
+    }
+}
 
 /// What formats need beside the twin.
 struct Beside {
@@ -107,18 +118,20 @@ struct Beside {
     clips: Vec<Shown>,
     /// The reconstruction.
     cloud: Option<Cloud>,
+    /// What the twin looks like.
+    look: Option<Look>,
 }
 
 impl Beside {
     /// What the asked formats need.
-    fn of(args: &ExportArgs, verdicts: Vec<(String, String)>) -> anyhow::Result<Self> {
+    fn of(args: &ExportArgs, verdicts: Vec<(String, String)>, look: Option<Look>) -> anyhow::Result<Self> {
         let clips = if args.format.contains(&Format::Egoarti) { clips(&args.twin)? } else { Vec::new() };
         let cloud = match (&args.joints.points, args.format.contains(&Format::Usdnet)) {
             (_, false) => None,
             (Some(points), true) => Some(ply::read(points)?),
             (None, true) => bail!("usdnet: parts are points of a reconstruction: give it by --points FILE.ply"),
         };
-        Ok(Self { verdicts, clips, cloud })
+        Ok(Self { verdicts, clips, cloud, look })
     }
 }
 
@@ -140,15 +153,19 @@ fn clips(twin: &Path) -> anyhow::Result<Vec<Shown>> {
 
 /// The files of one format.
 fn written(format: Format, twin: &Twin, beside: &Beside) -> crate::error::Result<Vec<File>> {
-    Ok(match format {
-        Format::Urdf => vec![("scene.urdf", export::urdf::write(twin)?.into_bytes())],
+    let look = beside.look.as_ref();
+    let files: Vec<(&str, Vec<u8>)> = match format {
+        Format::Urdf => vec![("scene.urdf", export::urdf::write(twin, look)?.into_bytes())],
         Format::Mjcf => vec![
-            ("scene.xml", export::mjcf::write(twin)?.into_bytes()),
-            ("kitchen.xml", export::mjcf::write_model(twin)?.into_bytes()),
+            ("scene.xml", export::mjcf::write(twin, look)?.into_bytes()),
+            ("kitchen.xml", export::mjcf::write_model(twin, look)?.into_bytes()),
         ],
-        Format::Gltf => vec![("scene.glb", export::gltf::write(twin, &beside.verdicts)?)],
+        Format::Gltf => vec![("scene.glb", export::gltf::write(twin, look, &beside.verdicts)?)],
         Format::GltfPhysics => vec![("physics.glb", export::gltf::write_physics(twin)?)],
-        Format::Usd => vec![("scene.usda", export::usd::write(twin)?.into_bytes())],
+        Format::Usd => vec![
+            ("scene.usda", export::usd::write(twin, look)?.into_bytes()),
+            ("scene.usdz", export::usd::write_package(twin, look)?),
+        ],
         Format::Arti4d => vec![("arti4d.json", annotations::arti4d(twin)?.into_bytes())],
         Format::Egoarti => {
             let [list, all] = annotations::egoarti(twin, &beside.clips)?;
@@ -166,7 +183,8 @@ fn written(format: Format, twin: &Twin, beside: &Beside) -> crate::error::Result
                 ("usdnet_instance_gt.txt", parts.instances.into_bytes()),
             ]
         }
-    })
+    };
+    Ok(files.into_iter().map(|(name, bytes)| (name.to_owned(), bytes)).collect())
 }
 
 pub fn run(args: &ExportArgs) -> anyhow::Result<Answer> {
@@ -175,15 +193,16 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<Answer> {
     let given = if args.joints.is_forced() { Given::Joints } else { kind_of(&args.twin)? };
     // What could not be built of a twin was said when it was made.
     let made_here = matches!(given, Given::Joints);
-    let (twin, verdicts) = match given {
+    let (twin, verdicts, look) = match given {
         Given::Twin => {
-            // With its verdicts, where they lie beside the twin: the same file as `paws twin` wrote.
-            let beside = match args.twin.is_dir() {
-                true => args.twin.join("validation.json"),
-                false => args.twin.with_file_name("validation.json"),
-            };
+            // With its verdicts and its look, where they lie beside the twin: the same file as `paws twin` wrote.
+            let dir =
+                if args.twin.is_dir() { args.twin.as_path() } else { args.twin.parent().unwrap_or(Path::new("")) };
+            let beside = dir.join("validation.json");
             let verdicts = if beside.is_file() { json::read::<Validation>(&beside)?.words() } else { Vec::new() };
-            (read_twin(&args.twin)?, verdicts)
+            let twin = read_twin(&args.twin)?;
+            let look = if args.no_textures { None } else { look::read(dir, &twin)? };
+            (twin, verdicts, look)
         }
         Given::Joints => {
             let path = &args.twin;
@@ -192,19 +211,23 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<Answer> {
             if target.canonicalize().is_ok_and(|t| path.canonicalize().is_ok_and(|p| p == t)) {
                 bail!("{}: would be replaced by the twin made of it; choose another --out", shown(path));
             }
-            files.push(("twin.json", json::text(&twin)?.into_bytes()));
-            (twin, Vec::new())
+            files.push(("twin.json".to_owned(), json::text(&twin)?.into_bytes()));
+            (twin, Vec::new(), None)
         }
     };
-    let beside = Beside::of(args, verdicts)?;
+    let beside = Beside::of(args, verdicts, look)?;
     let made: Vec<crate::error::Result<Vec<File>>> =
         args.format.par_iter().map(|format| written(*format, &twin, &beside)).collect();
     for format in made {
         files.extend(format?);
     }
-    std::fs::create_dir_all(&args.out).with_context(|| shown(&args.out))?;
+    if let Some(look) = beside.look.as_ref().filter(|_| args.format.iter().any(|f| f.needs_look())) {
+        files.extend(export::dress::files(&twin, look)?);
+    }
     for (name, bytes) in files {
         let path = args.out.join(name);
+        let folder = path.parent().unwrap_or(&args.out);
+        std::fs::create_dir_all(folder).with_context(|| shown(folder))?;
         write_file(&path, bytes)?;
         print(&format!("{}\n", shown(&path)))?;
     }

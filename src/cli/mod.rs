@@ -15,6 +15,7 @@ mod import;
 mod infer;
 mod joints;
 mod keep;
+mod look;
 mod measure;
 mod moved;
 mod output;

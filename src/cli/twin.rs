@@ -14,8 +14,10 @@ use super::{Answer, ConfigFile, Opening, keep, print, shown};
 use crate::config::{self, Config};
 use crate::hands::Trajectory;
 use crate::json;
+use crate::look::Look;
 use crate::math::Vector;
 use crate::pipeline::{self, Scene};
+use crate::recording::Recording;
 use crate::report::page::FileNote;
 use crate::report::table::aligned;
 use crate::report::{files, page, pictures, words};
@@ -40,11 +42,17 @@ pub struct TwinArgs {
     /// model) in DIR/steps
     #[arg(long)]
     keep: bool,
+    /// Leave the furniture and the room the plain boxes that they collide as
+    #[arg(long)]
+    no_textures: bool,
     #[command(flatten)]
     words: WordsArgs,
 }
 
-const FILES: [FileNote; 15] = [
+/// The folder of a look's files, as pages name it.
+const LOOK: &str = "look/";
+
+const FILES: [FileNote; 17] = [
     FileNote { name: "scene.urdf", what: "the twin for ROS, PyBullet, Drake, Pinocchio" },
     FileNote { name: "scene.xml", what: "the twin for MuJoCo, with floor, light and keyframes" },
     FileNote {
@@ -54,6 +62,8 @@ const FILES: [FileNote; 15] = [
     FileNote { name: "scene.glb", what: "the twin for viewers and game engines, with an animation per joint" },
     FileNote { name: "physics.glb", what: "the twin for engines that read KHR_physics_rigid_bodies" },
     FileNote { name: "scene.usda", what: "the twin for Isaac and OpenUSD, with UsdPhysics" },
+    FileNote { name: "scene.usdz", what: "the same with its pictures in one file, also for phones" },
+    FileNote { name: LOOK, what: "meshes and pictures that scene.urdf, scene.xml, kitchen.xml and scene.usda show" },
     FileNote { name: "index.html", what: "this page" },
     FileNote { name: "articulations.json", what: "every joint and every clip with its evidence" },
     FileNote { name: "predictions.json", what: "one row a clip, for `paws evaluate`" },
@@ -71,7 +81,17 @@ pub fn run(args: &TwinArgs) -> anyhow::Result<Answer> {
         return asked.count(&[args.opening.open(&args.recording)?], &config);
     }
     let given = Given { recording: &args.recording, opening: args.opening, door: args.door };
-    make(given, &args.out, &config, args.keep, asked.as_ref())
+    let wishes = Wishes { steps: args.keep, textures: !args.no_textures };
+    make(given, &args.out, &config, wishes, asked.as_ref())
+}
+
+/// What is to be made beside the twin.
+#[derive(Debug, Clone, Copy)]
+pub struct Wishes {
+    /// Every intermediate result.
+    pub steps: bool,
+    /// What it looks like.
+    pub textures: bool,
 }
 
 /// A joint's recorded hands, as `trajectories.json` has them.
@@ -121,7 +141,7 @@ pub fn make(
     given: Given,
     out: &Path,
     config: &Config,
-    keep_steps: bool,
+    wishes: Wishes,
     asked: Option<&Asked>,
 ) -> anyhow::Result<Answer> {
     let begin = Instant::now();
@@ -138,22 +158,22 @@ pub fn make(
     let recording = given.door.open(given.opening, given.recording)?;
     let steps = Steps::new();
     let model::Inferred { mut scene, reasoner, usage, exchanges, lost: unread } =
-        model::infer(&recording, config, asked, &steps, keep_steps)?;
+        model::infer(&recording, config, asked, &steps, wishes.steps)?;
     super::infer::weigh(&mut scene, &recording, config, &steps);
     steps.report("fitting boxes", 0, 1);
     let twin = fitting::fit(&scene, &recording.up(), &config.fitting);
     steps.report("simulating", 0, 1);
     let hands = joint_hands(&scene, &twin);
     let (validation, mut lost) = replayed(&twin, &hands, &recording.up(), &config.validation)?;
+    let look = match wishes.textures {
+        true => looked(&recording, &scene, &twin, config, &steps).unwrap_or_else(|error| {
+            lost.push(format!("textures: {error}"));
+            None
+        }),
+        false => None,
+    };
     steps.report("writing", 0, 1);
-
-    let glb = export::gltf::write(&twin, &validation.words())?;
-    output.write("scene.urdf", export::urdf::write(&twin)?)?;
-    output.write("scene.xml", export::mjcf::write(&twin)?)?;
-    output.write("kitchen.xml", export::mjcf::write_model(&twin)?)?;
-    output.write("scene.glb", &glb)?;
-    output.write("physics.glb", export::gltf::write_physics(&twin)?)?;
-    output.write("scene.usda", export::usd::write(&twin)?)?;
+    let glb = models(&output, &twin, look.as_ref(), &validation)?;
     output.write("articulations.json", files::articulations(&scene, &reasoner)?)?;
     output.write("predictions.json", json::text(&files::predictions(&scene, &twin))?)?;
     output.write("twin.json", json::text(&twin)?)?;
@@ -164,9 +184,14 @@ pub fn make(
     output.write("trajectories.json", json::text(&hands)?)?;
     output.write("config.toml", config.to_toml())?;
     let command = format!("paws twin {} --out {}", shown(&recording.dir), shown(out));
-    let notes: Vec<FileNote> = FILES.iter().filter(|f| keep_steps || f.name != "steps/").cloned().collect();
+    let is_there = |note: &&FileNote| match note.name {
+        "steps/" => wishes.steps,
+        LOOK => look.is_some(),
+        _ => true,
+    };
+    let notes: Vec<FileNote> = FILES.iter().filter(is_there).cloned().collect();
     output.write("index.html", page::render(&scene, &twin, &validation, &glb, &command, &notes)?)?;
-    if keep_steps {
+    if wishes.steps {
         lost.extend(keep::write(&recording, &scene, &twin, &exchanges, &output));
     }
     output.finish()?;
@@ -196,6 +221,43 @@ pub fn make(
     let refuted = validation.joints.iter().any(|j| j.verdict == Verdict::Fail);
     let whole = lost.is_empty() && unread.is_empty() && twin.left_out.is_empty() && !damaged;
     Ok(if refuted || twin.furniture.is_empty() || !whole { Answer::No } else { Answer::Yes })
+}
+
+/// What the twin looks like; `None` where there is nothing to see. An error costs the look, not the twin: everything else is
+/// written without it.
+// MERGE: the body becomes
+//     steps.report("textures", 0, 1);
+//     crate::appearance::look(recording, scene, twin, config).and_then(|look| worn(twin, look))
+// and the names lose their underscores.
+fn looked(
+    _recording: &Recording,
+    _scene: &Scene,
+    twin: &Twin,
+    _config: &Config,
+    _steps: &Steps,
+) -> crate::error::Result<Option<Look>> {
+    worn(twin, Look::default())
+}
+
+/// A look that the exporters take, where there is anything in it.
+fn worn(twin: &Twin, look: Look) -> crate::error::Result<Option<Look>> {
+    Ok(export::dress::shows(twin, &look)?.then_some(look))
+}
+
+/// Writes the twin in all formats; returns the file for viewers.
+fn models(output: &Output, twin: &Twin, look: Option<&Look>, validation: &Validation) -> anyhow::Result<Vec<u8>> {
+    let glb = export::gltf::write(twin, look, &validation.words())?;
+    output.write("scene.urdf", export::urdf::write(twin, look)?)?;
+    output.write("scene.xml", export::mjcf::write(twin, look)?)?;
+    output.write("kitchen.xml", export::mjcf::write_model(twin, look)?)?;
+    output.write("scene.glb", &glb)?;
+    output.write("physics.glb", export::gltf::write_physics(twin)?)?;
+    output.write("scene.usda", export::usd::write(twin, look)?)?;
+    output.write("scene.usdz", export::usd::write_package(twin, look)?)?;
+    for (name, bytes) in look.map_or_else(|| Ok(Vec::new()), |look| export::dress::files(twin, look))? {
+        output.write(&name, bytes)?;
+    }
+    Ok(glb)
 }
 
 /// The replay of all joints, and what had to be left out of it: a hand that cannot be replayed costs its clip, a joint that

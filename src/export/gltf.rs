@@ -6,9 +6,11 @@
 use gltf::binary::{Glb, Header};
 use serde_json::{Value, json};
 
+use super::dress::{self, Dress, Piece};
 use super::{ROLES, ROOM, color, from_x, material, principal};
 use crate::articulation::JointKind;
 use crate::error::{Error, Result};
+use crate::look::{Look, Texture};
 use crate::math::{Point, rotation};
 use crate::twin::{Part, Solid, Twin, mass_properties};
 
@@ -19,6 +21,13 @@ const SHAPES: &str = "KHR_implicit_shapes";
 const OPEN_SECS: f32 = 1.5;
 /// Rotations are interpolated the short way round: keyframes lie at most this far apart.
 const MAX_STEP_RAD: f64 = 1.2;
+
+/// What views of the buffer are for.
+const ARRAY_BUFFER: u32 = 34962;
+const ELEMENT_ARRAY_BUFFER: u32 = 34963;
+/// Component types of accessors.
+const U16: u32 = 5123;
+const U32: u32 = 5125;
 
 /// Verdicts to show with the joints: (joint id, verdict).
 pub type Verdicts<'a> = &'a [(String, String)];
@@ -32,7 +41,8 @@ struct Buffer {
 }
 
 impl Buffer {
-    fn push(&mut self, data: &[u8], target: Option<u32>, accessor: Value) -> usize {
+    /// Adds a view; returns its index.
+    fn view(&mut self, data: &[u8], target: Option<u32>) -> usize {
         while !self.bytes.len().is_multiple_of(4) {
             self.bytes.push(0);
         }
@@ -42,8 +52,11 @@ impl Buffer {
         }
         self.bytes.extend_from_slice(data);
         self.views.push(view);
-        let mut accessor = accessor;
-        accessor["bufferView"] = json!(self.views.len() - 1);
+        self.views.len() - 1
+    }
+
+    fn push(&mut self, data: &[u8], target: Option<u32>, mut accessor: Value) -> usize {
+        accessor["bufferView"] = json!(self.view(data, target));
         self.accessors.push(accessor);
         self.accessors.len() - 1
     }
@@ -60,6 +73,38 @@ impl Buffer {
         });
         self.push(&data, target, accessor)
     }
+
+    /// One point or direction a vertex, with the bounds.
+    fn vectors(&mut self, rows: &[[f32; 3]]) -> usize {
+        let bound = |pick: fn(f32, f32) -> f32, start: f32| -> [f32; 3] {
+            rows.iter().fold([start; 3], |b, r| std::array::from_fn(|c| pick(b[c], r[c])))
+        };
+        let data: Vec<u8> = rows.iter().flatten().flat_map(|f| f.to_le_bytes()).collect();
+        let accessor = json!({
+            "componentType": 5126, "count": rows.len(), "type": "VEC3",
+            "min": bound(f32::min, f32::INFINITY), "max": bound(f32::max, f32::NEG_INFINITY),
+        });
+        self.push(&data, Some(ARRAY_BUFFER), accessor)
+    }
+
+    /// Texture coordinates, as shares of 65535.
+    fn shares(&mut self, rows: &[[u16; 2]]) -> usize {
+        let data: Vec<u8> = rows.iter().flatten().flat_map(|s| s.to_le_bytes()).collect();
+        let accessor = json!({"componentType": U16, "normalized": true, "count": rows.len(), "type": "VEC2"});
+        self.push(&data, Some(ARRAY_BUFFER), accessor)
+    }
+
+    /// Vertex numbers, in as few bytes as hold them: the largest number of a type is not allowed.
+    fn indices(&mut self, triangles: &[[u32; 3]], vertices: usize) -> usize {
+        let all = triangles.iter().flatten();
+        let (kind, data): (u32, Vec<u8>) = if vertices <= usize::from(u16::MAX) {
+            (U16, all.flat_map(|i| (*i as u16).to_le_bytes()).collect())
+        } else {
+            (U32, all.flat_map(|i| i.to_le_bytes()).collect())
+        };
+        let accessor = json!({"componentType": kind, "count": 3 * triangles.len(), "type": "SCALAR"});
+        self.push(&data, Some(ELEMENT_ARRAY_BUFFER), accessor)
+    }
 }
 
 /// A file in the making.
@@ -68,6 +113,7 @@ struct Scene {
     meshes: Vec<Value>,
     materials: Vec<Value>,
     nodes: Vec<Value>,
+    images: Vec<Value>,
 }
 
 impl Scene {
@@ -92,7 +138,31 @@ impl Scene {
             .collect();
         let half = std::f64::consts::FRAC_1_SQRT_2;
         let nodes = vec![json!({"name": "scene", "rotation": [-half, 0.0, 0.0, half]})];
-        Self { buffer, meshes, materials, nodes }
+        Self { buffer, meshes, materials, nodes, images: Vec::new() }
+    }
+
+    /// Embeds pictures with a material each: plain surfaces, so that viewers light them as they light the rest.
+    fn pictures(&mut self, textures: &[Texture]) -> Result<()> {
+        for (texture, jpeg) in textures.iter().zip(dress::jpegs(textures)?) {
+            let view = self.buffer.view(&jpeg, None);
+            self.materials.push(json!({"name": dress::material(texture), "pbrMetallicRoughness":
+                {"baseColorTexture": {"index": self.images.len()}, "metallicFactor": 0.0, "roughnessFactor": 1.0}}));
+            self.images.push(json!({"name": texture.name, "bufferView": view, "mimeType": "image/jpeg"}));
+        }
+        Ok(())
+    }
+
+    /// Adds a textured mesh in a node of its own; returns the node. `link` is the part whose mesh it is, or the room.
+    fn textured(&mut self, piece: &Piece, link: &str) -> usize {
+        let positions = self.buffer.vectors(&piece.positions);
+        let normals = self.buffer.vectors(&piece.normals);
+        let uv = self.buffer.shares(&piece.uv);
+        let indices = self.buffer.indices(&piece.triangles, piece.positions.len());
+        self.meshes.push(json!({"name": piece.name, "primitives": [{
+            "attributes": {"POSITION": positions, "NORMAL": normals, "TEXCOORD_0": uv},
+            "indices": indices, "material": ROLES.len() + piece.index}]}));
+        let mesh = self.meshes.len() - 1;
+        self.push(json!({"name": piece.name, "mesh": mesh, "extras": {"look": {"link": link, "seen": piece.seen}}}))
     }
 
     /// Adds a node; returns its index.
@@ -125,6 +195,13 @@ impl Scene {
         ] {
             root[key] = Value::Array(list);
         }
+        if !self.images.is_empty() {
+            let textures: Vec<Value> = (0..self.images.len()).map(|i| json!({"source": i, "sampler": 0})).collect();
+            root["textures"] = Value::Array(textures);
+            // Smooth near and far; an atlas does not repeat.
+            root["samplers"] = json!([{"magFilter": 9729, "minFilter": 9987, "wrapS": 33071, "wrapT": 33071}]);
+            root["images"] = Value::Array(self.images);
+        }
         for (key, value) in more {
             root[key] = value;
         }
@@ -138,20 +215,26 @@ impl Scene {
     }
 }
 
-/// The twin as GLB for viewers. World +Z up becomes glTF's +Y up in the root node.
+/// The twin as GLB for viewers, with its look where it has one. World +Z up becomes glTF's +Y up in the root node.
+///
+/// A node of a textured mesh has `look` in its extras: the `link` (a joint's id, or `room`) and the share of its surface
+/// that was `seen`. Boxes that it hides keep their nodes, without meshes.
 ///
 /// # Errors
-/// Where the twin cannot be a scene (see [`super::check`]).
-pub fn write(twin: &Twin, verdicts: Verdicts) -> Result<Vec<u8>> {
-    super::check(twin)?;
+/// Where the twin cannot be a scene (see [`super::check`]), or what is wrong with the look.
+pub fn write(twin: &Twin, look: Option<&Look>, verdicts: Verdicts) -> Result<Vec<u8>> {
+    let dress = Dress::of(twin, look)?;
     let mut scene = Scene::new();
+    scene.pictures(dress.textures)?;
+    let fixed = dress.room.is_empty();
     let mut roots = Vec::new();
     let mut animations = Vec::new();
     for f in &twin.furniture {
         let base = scene.push(json!({"name": f.name}));
         let mut children: Vec<usize> =
-            f.carcass.iter().map(|s| push_box(&mut scene.nodes, s, &Point::origin())).collect();
+            f.carcass.iter().map(|s| push_box(&mut scene.nodes, s, &Point::origin(), fixed)).collect();
         let part = &f.part;
+        let own = dress.part(&part.id);
         let origin = part.joint.articulation.origin;
         let mut extras = extras(part, twin.density_kg_per_m3);
         let verdict = verdicts.iter().find(|(id, _)| *id == part.id).map_or("unknown", |(_, v)| v.as_str());
@@ -160,7 +243,8 @@ pub fn write(twin: &Twin, verdicts: Verdicts) -> Result<Vec<u8>> {
             "name": part.id, "translation": array(origin.coords.as_slice()), "extras": extras,
         }));
         let mut part_children: Vec<usize> =
-            part.solids.iter().map(|s| push_box(&mut scene.nodes, s, &origin)).collect();
+            part.solids.iter().map(|s| push_box(&mut scene.nodes, s, &origin, own.is_empty())).collect();
+        part_children.extend(own.iter().map(|piece| scene.textured(piece, &part.id)));
         part_children.push(scene.push(handle(part)));
         scene.nodes[pivot]["children"] = json!(part_children);
         children.push(pivot);
@@ -168,9 +252,11 @@ pub fn write(twin: &Twin, verdicts: Verdicts) -> Result<Vec<u8>> {
         roots.push(base);
         animations.push(animation(&mut scene.buffer, pivot, part));
     }
-    if !twin.room.is_empty() {
+    if !(twin.room.is_empty() && fixed) {
         let room = scene.push(json!({"name": ROOM}));
-        let children: Vec<usize> = twin.room.iter().map(|s| push_box(&mut scene.nodes, s, &Point::origin())).collect();
+        let mut children: Vec<usize> =
+            twin.room.iter().map(|s| push_box(&mut scene.nodes, s, &Point::origin(), fixed)).collect();
+        children.extend(dress.room.iter().map(|piece| scene.textured(piece, ROOM)));
         scene.nodes[room]["children"] = json!(children);
         roots.push(room);
     }
@@ -180,7 +266,8 @@ pub fn write(twin: &Twin, verdicts: Verdicts) -> Result<Vec<u8>> {
 
 /// The twin as GLB for engines, with `KHR_physics_rigid_bodies` and `KHR_implicit_shapes`: each part is a body with mass
 /// and inertia, each box a collider, each joint two frames with limits in radians or metres and a damper; carcasses and
-/// the room collide and do not move. There is no animation in it, and no dry friction: the extension has none.
+/// the room collide and do not move. There is no animation in it, and no dry friction: the extension has none. Nor has it a
+/// look: an engine's user sees what collides.
 ///
 /// # Errors
 /// Where the twin cannot be a scene (see [`super::check`]).
@@ -333,23 +420,26 @@ fn array(values: &[f64]) -> Vec<f64> {
     values.iter().map(|v| single(*v)).collect()
 }
 
-fn push_box(nodes: &mut Vec<Value>, solid: &Solid, origin: &Point) -> usize {
+/// Adds a box's node, with its mesh where it is `shown`: the node's scale is the box's size in any case.
+fn push_box(nodes: &mut Vec<Value>, solid: &Solid, origin: &Point, shown: bool) -> usize {
     let pose = super::local_pose(&solid.shape, origin);
     let q = pose.rotation.quaternion();
-    nodes.push(json!({
-        "name": solid.name, "mesh": mesh(solid),
+    let mut node = json!({
+        "name": solid.name,
         "translation": array(pose.translation.vector.as_slice()),
         "rotation": array(&[q.i, q.j, q.k, q.w]),
         "scale": array((solid.shape.half * 2.0).as_slice()),
         "extras": {"role": solid.role, "seen": solid.seen},
-    }));
+    });
+    if shown {
+        node["mesh"] = json!(mesh(solid));
+    }
+    nodes.push(node);
     nodes.len() - 1
 }
 
 /// A cube of side 1 with flat normals: accessors of positions, normals, indices.
 fn unit_cube(buffer: &mut Buffer) -> (usize, usize, usize) {
-    const ARRAY_BUFFER: u32 = 34962;
-    const ELEMENT_ARRAY_BUFFER: u32 = 34963;
     let (mut positions, mut normals, mut indices) = (Vec::new(), Vec::new(), Vec::<u16>::new());
     for axis in 0..3 {
         for sign in [-1.0f32, 1.0] {
@@ -370,7 +460,7 @@ fn unit_cube(buffer: &mut Buffer) -> (usize, usize, usize) {
     let data: Vec<u8> = indices.iter().flat_map(|i| i.to_le_bytes()).collect();
     let p = buffer.floats(&positions, "VEC3", Some(ARRAY_BUFFER));
     let n = buffer.floats(&normals, "VEC3", Some(ARRAY_BUFFER));
-    let accessor = json!({"componentType": 5123, "count": indices.len(), "type": "SCALAR"});
+    let accessor = json!({"componentType": U16, "count": indices.len(), "type": "SCALAR"});
     let i = buffer.push(&data, Some(ELEMENT_ARRAY_BUFFER), accessor);
     (p, n, i)
 }

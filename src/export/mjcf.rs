@@ -4,9 +4,11 @@ use std::io::Cursor;
 
 use quick_xml::Writer;
 
+use super::dress::{self, Dress, Piece};
 use super::{ROLES, ROOM, color, local_pose, material};
 use crate::articulation::JointKind;
 use crate::error::{Error, Result};
+use crate::look::Look;
 use crate::math::Point;
 use crate::twin::{Solid, Twin, mass_properties};
 
@@ -23,30 +25,35 @@ const ROOM_FLOOR: &str = "room_floor";
 
 /// The twin as a scene: the furniture with floor and light, and keyframes `closed` and `open`.
 ///
+/// Of a look it names the files of [`dress::files`], which have to lie beside it. Its meshes are in group 2 and touch nothing;
+/// boxes that they hide are in group 3 alone.
+///
 /// # Errors
-/// Where the twin cannot be a simulator's model (see [`super::check`]).
-pub fn write(twin: &Twin) -> Result<String> {
-    text(twin, true)
+/// Where the twin cannot be a simulator's model (see [`super::check`]), or what is wrong with the look.
+pub fn write(twin: &Twin, look: Option<&Look>) -> Result<String> {
+    text(twin, look, true)
 }
 
-/// The furniture alone, to be included in a scene that has a floor and light of its own.
+/// The furniture alone, to be included in a scene that has a floor and light of its own. MuJoCo looks for the files of a look
+/// beside that scene.
 ///
 /// # Errors
 /// As [`write`].
-pub fn write_model(twin: &Twin) -> Result<String> {
-    text(twin, false)
+pub fn write_model(twin: &Twin, look: Option<&Look>) -> Result<String> {
+    text(twin, look, false)
 }
 
-fn text(twin: &Twin, with_room: bool) -> Result<String> {
-    super::check(twin)?;
+fn text(twin: &Twin, look: Option<&Look>, with_room: bool) -> Result<String> {
+    let dress = Dress::of(twin, look)?;
     let mut xml = Writer::new_with_indent(Cursor::new(Vec::new()), b' ', 2);
-    model(&mut xml, twin, with_room).map_err(|e| Error::Export(format!("MJCF: {e}")))?;
+    model(&mut xml, twin, &dress, with_room).map_err(|e| Error::Export(format!("MJCF: {e}")))?;
     let mut text = String::from_utf8(xml.into_inner().into_inner()).map_err(|e| Error::Export(format!("MJCF: {e}")))?;
     text.push('\n');
     Ok(text)
 }
 
-fn model(xml: &mut Xml, twin: &Twin, with_room: bool) -> std::io::Result<()> {
+fn model(xml: &mut Xml, twin: &Twin, dress: &Dress, with_room: bool) -> std::io::Result<()> {
+    let fixed = dress.room.is_empty();
     xml.create_element("mujoco").with_attribute(("model", twin.name.as_str())).write_inner_content(|xml| {
         xml.create_element("compiler").with_attributes([("angle", "radian"), ("autolimits", "true")]).write_empty()?;
         xml.create_element("option").with_attribute(("integrator", "implicitfast")).write_empty()?;
@@ -63,7 +70,7 @@ fn model(xml: &mut Xml, twin: &Twin, with_room: bool) -> std::io::Result<()> {
                     .with_attributes([("name", material(role)), ("rgba", list(&color(role)).as_str())])
                     .write_empty()?;
             }
-            Ok(())
+            assets(xml, dress)
         })?;
         xml.create_element("worldbody").write_inner_content(|xml| {
             if with_room {
@@ -74,15 +81,16 @@ fn model(xml: &mut Xml, twin: &Twin, with_room: bool) -> std::io::Result<()> {
                     xml.create_element("body").with_attribute(("name", f.name.as_str())).write_inner_content(
                         |xml| {
                             inertial(xml, &f.carcass, &Point::origin(), twin.density_kg_per_m3)?;
-                            geoms(xml, &f.carcass, &Point::origin())?;
-                            part(xml, twin, f)
+                            geoms(xml, &f.carcass, &Point::origin(), fixed)?;
+                            part(xml, twin, f, dress.part(&f.part.id))
                         },
                     )?;
                 }
-                if !twin.room.is_empty() {
+                if !(twin.room.is_empty() && fixed) {
                     xml.create_element("body").with_attribute(("name", ROOM)).write_inner_content(|xml| {
                         inertial(xml, &twin.room, &Point::origin(), twin.density_kg_per_m3)?;
-                        geoms(xml, &twin.room, &Point::origin())
+                        meshes(xml, &dress.room)?;
+                        geoms(xml, &twin.room, &Point::origin(), fixed)
                     })?;
                 }
                 Ok(())
@@ -178,7 +186,7 @@ fn floor_and_light(xml: &mut Xml, twin: &Twin) -> std::io::Result<()> {
     Ok(())
 }
 
-fn part(xml: &mut Xml, twin: &Twin, f: &crate::twin::Furniture) -> std::io::Result<()> {
+fn part(xml: &mut Xml, twin: &Twin, f: &crate::twin::Furniture, look: &[Piece]) -> std::io::Result<()> {
     let part = &f.part;
     let phi = part.joint.articulation;
     let mut body = xml.create_element("body").with_attributes([
@@ -203,7 +211,8 @@ fn part(xml: &mut Xml, twin: &Twin, f: &crate::twin::Furniture) -> std::io::Resu
                 ("frictionloss", part.joint.friction.to_string().as_str()),
             ])
             .write_empty()?;
-        geoms(xml, &part.solids, &phi.origin)?;
+        meshes(xml, look)?;
+        geoms(xml, &part.solids, &phi.origin, look.is_empty())?;
         xml.create_element("site")
             .with_attributes([
                 ("name", format!("{}_handle", part.id).as_str()),
@@ -232,7 +241,49 @@ fn inertial(xml: &mut Xml, solids: &[Solid], origin: &Point, density: f64) -> st
     Ok(())
 }
 
-fn geoms(xml: &mut Xml, solids: &[Solid], origin: &Point) -> std::io::Result<()> {
+/// Pictures, their materials and the meshes of a look. Colours were seen in the room's light: nothing gleams.
+fn assets(xml: &mut Xml, dress: &Dress) -> std::io::Result<()> {
+    for texture in dress.textures {
+        let name = dress::material(texture);
+        xml.create_element("texture")
+            .with_attributes([("name", name.as_str()), ("type", "2d"), ("file", dress::picture_file(texture).as_str())])
+            .write_empty()?;
+        xml.create_element("material")
+            .with_attributes([
+                ("name", name.as_str()),
+                ("texture", name.as_str()),
+                ("specular", "0"),
+                ("shininess", "0"),
+            ])
+            .write_empty()?;
+    }
+    for piece in dress.all() {
+        xml.create_element("mesh")
+            .with_attributes([("name", piece.name.as_str()), ("file", dress::mesh_file(piece).as_str())])
+            .write_empty()?;
+    }
+    Ok(())
+}
+
+/// Textured meshes of a body: seen, not touched, without a weight.
+fn meshes(xml: &mut Xml, pieces: &[Piece]) -> std::io::Result<()> {
+    for piece in pieces {
+        xml.create_element("geom")
+            .with_attributes([
+                ("name", piece.name.as_str()),
+                ("class", "visual"),
+                ("type", "mesh"),
+                ("mesh", piece.name.as_str()),
+                ("material", dress::material(piece.texture).as_str()),
+                ("mass", "0"),
+            ])
+            .write_empty()?;
+    }
+    Ok(())
+}
+
+/// Boxes that collide, each with one to look at where they are `shown`.
+fn geoms(xml: &mut Xml, solids: &[Solid], origin: &Point, shown: bool) -> std::io::Result<()> {
     for s in solids {
         let pose = local_pose(&s.shape, origin);
         let q = pose.rotation.quaternion();
@@ -241,6 +292,9 @@ fn geoms(xml: &mut Xml, solids: &[Solid], origin: &Point) -> std::io::Result<()>
         let size = list(s.shape.half.as_slice());
         let visual = format!("{}_visual", s.name);
         for (name, class) in [(visual.as_str(), "visual"), (s.name.as_str(), "collision")] {
+            if class == "visual" && !shown {
+                continue;
+            }
             let mut geom = xml.create_element("geom").with_attributes([
                 ("name", name),
                 ("class", class),

@@ -1,13 +1,19 @@
 //! A twin as URDF, MJCF, glTF and USD: `&Twin -> bytes`, no IO, no recording.
 //!
+//! With a look beside it, textured meshes are shown in the place of boxes: a part's where it has meshes of its own, all
+//! fixed boxes where the room has. Boxes go on to carry contacts and masses.
+//!
 //! All formats share one set of frames: a part's link sits at its joint's origin with the world's axes, a base and the
 //! room at the world's origin. Boxes keep their own orientation.
 
 pub mod annotations;
+pub mod dress;
 pub mod gltf;
 pub mod mjcf;
 pub mod urdf;
 pub mod usd;
+
+use std::collections::BTreeSet;
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
@@ -71,6 +77,11 @@ pub(crate) fn principal(inertia: &Matrix3<f64>) -> (Vector, UnitQuaternion<f64>)
 /// # Errors
 /// Naming the part and what is wrong with it.
 pub fn check(twin: &Twin) -> Result<()> {
+    names(twin).map(|_| ())
+}
+
+/// All names that the formats give to what is in a checked twin.
+fn names(twin: &Twin) -> Result<BTreeSet<String>> {
     let fault = |text: String| Err(Error::Export(text));
     if !(twin.density_kg_per_m3.is_finite() && twin.density_kg_per_m3 > 0.0) {
         return fault(format!("density {} must be positive", twin.density_kg_per_m3));
@@ -79,7 +90,7 @@ pub fn check(twin: &Twin) -> Result<()> {
         return fault("the twin's name has control characters".to_owned());
     }
     // Names that the formats add must not be taken either.
-    let mut names: std::collections::BTreeSet<String> =
+    let mut names: BTreeSet<String> =
         ["world", "floor", "scene", mjcf::ROOT, ROOM, "room_fixed", usd::MATERIALS].map(str::to_owned).into();
     let mut take = |name: String| {
         if !is_name(&name) {
@@ -115,7 +126,7 @@ pub fn check(twin: &Twin) -> Result<()> {
         take(format!("{}_visual", s.name))?;
         s.check().map_err(Error::Export)?;
     }
-    Ok(())
+    Ok(names)
 }
 
 /// Whether a name is one in all formats: USD's are identifiers.

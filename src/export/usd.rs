@@ -1,10 +1,18 @@
-//! USD as text (`.usda`) with UsdPhysics: for Isaac and whatever else reads OpenUSD.
+//! USD as text (`.usda`) with UsdPhysics, and as a package with its pictures (`.usdz`): for Isaac and whatever else reads
+//! OpenUSD.
+
+use std::fmt::Write as _;
+use std::io::{Cursor, Write as _};
 
 use nalgebra::UnitQuaternion;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipWriter};
 
+use super::dress::{self, Dress, Piece};
 use super::{ROLES, ROOM, color, from_x, local_pose, material, mjcf, principal};
 use crate::articulation::JointKind;
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::look::{Look, Texture};
 use crate::math::{Point, Vector};
 use crate::twin::{Furniture, Solid, Twin, mass_properties};
 
@@ -62,10 +70,43 @@ impl Usda {
 /// UsdPhysics asks of articulations that do not float. The room collides without being a body. Gravity is outside the
 /// default prim: a stage that references the twin has its own.
 ///
+/// Of a look it holds the meshes; its pictures are the files of [`dress::files`], which have to lie beside it. Boxes that
+/// meshes hide are guides: they collide, and are shown when asked for.
+///
 /// # Errors
-/// Where the twin cannot be a simulator's model (see [`super::check`]).
-pub fn write(twin: &Twin) -> Result<String> {
-    super::check(twin)?;
+/// Where the twin cannot be a simulator's model (see [`super::check`]), or what is wrong with the look.
+pub fn write(twin: &Twin, look: Option<&Look>) -> Result<String> {
+    Ok(text(twin, &Dress::of(twin, look)?, &dress::picture_file))
+}
+
+/// The same with its pictures in one file, as `usdz` wants it: nothing compressed, every file at a multiple of 64 bytes.
+///
+/// # Errors
+/// As [`write`].
+pub fn write_package(twin: &Twin, look: Option<&Look>) -> Result<Vec<u8>> {
+    let dress = Dress::of(twin, look)?;
+    let name = |texture: &Texture| format!("{}/{}.jpg", dress::FOLDER, texture.name);
+    let mut files = vec![("scene.usda".to_owned(), text(twin, &dress, &name).into_bytes())];
+    files.extend(dress.textures.iter().map(name).zip(dress::jpegs(dress.textures)?));
+    package(&files).map_err(|e| Error::Export(format!("USD: {e}")))
+}
+
+fn package(files: &[(String, Vec<u8>)]) -> zip::result::ZipResult<Vec<u8>> {
+    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Stored)
+        // The same bytes at any time.
+        .last_modified_time(DateTime::default())
+        .with_alignment(64);
+    for (name, bytes) in files {
+        zip.start_file(name.as_str(), options)?;
+        zip.write_all(bytes)?;
+    }
+    Ok(zip.finish()?.into_inner())
+}
+
+/// The text; `picture` tells where a texture's file is.
+fn text(twin: &Twin, dress: &Dress, picture: &dyn Fn(&Texture) -> String) -> String {
     let mut out = Usda { text: "#usda 1.0\n".to_owned(), depth: 0 };
     out.line("(");
     out.depth += 1;
@@ -82,13 +123,15 @@ pub fn write(twin: &Twin) -> Result<String> {
     out.line("");
     let scene = custom(&[format!("string scene = {}", quoted(&twin.name))]);
     out.open(&format!("Xform \"{ROOT}\""), &[scene, vec!["kind = \"component\"".to_owned()]].concat());
-    materials(&mut out);
+    materials(&mut out, dress.textures, picture);
     for f in &twin.furniture {
-        furniture(&mut out, f, twin.density_kg_per_m3);
+        furniture(&mut out, f, twin.density_kg_per_m3, dress);
     }
-    if !twin.room.is_empty() {
+    let shown = dress.room.is_empty();
+    if !(twin.room.is_empty() && shown) {
         out.open(&format!("Xform \"{ROOM}\""), &[]);
-        boxes(&mut out, &twin.room, &Point::origin());
+        meshes(&mut out, &dress.room);
+        boxes(&mut out, &twin.room, &Point::origin(), shown);
         out.close();
     }
     out.close();
@@ -97,7 +140,7 @@ pub fn write(twin: &Twin) -> Result<String> {
     out.line("vector3f physics:gravityDirection = (0, 0, -1)");
     out.line(&format!("float physics:gravityMagnitude = {}", single(GRAVITY)));
     out.close();
-    Ok(out.text)
+    out.text
 }
 
 /// The nearest number of single precision, in as few digits as read back as it; no minus zero.
@@ -143,7 +186,7 @@ fn apis(names: &[&str]) -> String {
     format!("prepend apiSchemas = [{}]", names.join(", "))
 }
 
-fn materials(out: &mut Usda) {
+fn materials(out: &mut Usda, textures: &[Texture], picture: &dyn Fn(&Texture) -> String) {
     out.open(&format!("Scope \"{MATERIALS}\""), &[]);
     for role in ROLES {
         let name = material(role);
@@ -158,10 +201,42 @@ fn materials(out: &mut Usda) {
         out.close();
         out.close();
     }
+    for texture in textures {
+        textured(out, &dress::material(texture), &picture(texture));
+    }
     out.close();
 }
 
-fn furniture(out: &mut Usda, f: &Furniture, density: f64) {
+/// A material whose colour is a picture's, by the texture coordinates `st`.
+fn textured(out: &mut Usda, name: &str, file: &str) {
+    let path = format!("/{ROOT}/{MATERIALS}/{name}");
+    out.open(&format!("Material \"{name}\""), &[]);
+    out.line(&format!("token outputs:surface.connect = <{path}/shader.outputs:surface>"));
+    out.open("Shader \"shader\"", &[]);
+    out.line("uniform token info:id = \"UsdPreviewSurface\"");
+    out.line(&format!("color3f inputs:diffuseColor.connect = <{path}/picture.outputs:rgb>"));
+    out.line("float inputs:metallic = 0");
+    out.line("float inputs:roughness = 1");
+    out.line("token outputs:surface");
+    out.close();
+    out.open("Shader \"picture\"", &[]);
+    out.line("uniform token info:id = \"UsdUVTexture\"");
+    out.line(&format!("asset inputs:file = @./{file}@"));
+    out.line("token inputs:sourceColorSpace = \"sRGB\"");
+    out.line(&format!("float2 inputs:st.connect = <{path}/st.outputs:result>"));
+    out.line("token inputs:wrapS = \"clamp\"");
+    out.line("token inputs:wrapT = \"clamp\"");
+    out.line("float3 outputs:rgb");
+    out.close();
+    out.open("Shader \"st\"", &[]);
+    out.line("uniform token info:id = \"UsdPrimvarReader_float2\"");
+    out.line("string inputs:varname = \"st\"");
+    out.line("float2 outputs:result");
+    out.close();
+    out.close();
+}
+
+fn furniture(out: &mut Usda, f: &Furniture, density: f64, dress: &Dress) {
     let part = &f.part;
     let phi = part.joint.articulation;
     let origin = phi.origin.coords;
@@ -171,8 +246,12 @@ fn furniture(out: &mut Usda, f: &Furniture, density: f64) {
     out.open(&format!("Xform \"{group}\""), &[apis(&["PhysicsArticulationRootAPI"])]);
 
     open_body(out, &f.name, &f.carcass, &Point::origin(), density, false);
+    boxes(out, &f.carcass, &Point::origin(), dress.room.is_empty());
     out.close();
     open_body(out, &link, &part.solids, &phi.origin, density, part.joint.balanced);
+    let look = dress.part(&part.id);
+    meshes(out, look);
+    boxes(out, &part.solids, &phi.origin, look.is_empty());
     out.open(&format!("Xform \"{}_handle\"", part.id), &[]);
     place(out, &(part.handle - phi.origin), &part.bounds.orientation(), None);
     out.close();
@@ -231,7 +310,7 @@ fn frames(out: &mut Usda, origin: &Vector, turn: &UnitQuaternion<f64>) {
     }
 }
 
-/// Opens a body with its boxes; the caller closes it.
+/// Opens a body of boxes; the caller puts them into it and closes it.
 fn open_body(out: &mut Usda, name: &str, solids: &[Solid], origin: &Point, density: f64, balanced: bool) {
     let mut schemas = vec!["PhysicsRigidBodyAPI", "PhysicsMassAPI"];
     if balanced {
@@ -251,11 +330,49 @@ fn open_body(out: &mut Usda, name: &str, solids: &[Solid], origin: &Point, densi
     }
     out.line(&format!("double3 xformOp:translate = {}", doubles(origin.coords.as_slice())));
     out.line("uniform token[] xformOpOrder = [\"xformOp:translate\"]");
-    boxes(out, solids, origin);
 }
 
-/// Cubes of side 2, scaled: some readers take one of side 1 for one of side 2.
-fn boxes(out: &mut Usda, solids: &[Solid], origin: &Point) {
+/// Numbers in parentheses, separated by commas.
+fn tuples<const N: usize>(rows: impl Iterator<Item = [String; N]>) -> String {
+    let mut text = String::from("[");
+    for (i, row) in rows.enumerate() {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{}({})", if i > 0 { "," } else { "" }, row.join(","));
+    }
+    text.push(']');
+    text
+}
+
+/// Textured meshes; they are shown, and touch nothing.
+fn meshes(out: &mut Usda, pieces: &[Piece]) {
+    for piece in pieces {
+        out.open(
+            &format!("Mesh \"{}\"", piece.name),
+            &[vec![apis(&["MaterialBindingAPI"])], custom(&[format!("double seenShare = {}", piece.seen)])].concat(),
+        );
+        let extent = |pick: fn(f32, f32) -> f32, start: f32| {
+            piece.positions.iter().fold([start; 3], |b, p| std::array::from_fn(|c| pick(b[c], p[c])))
+        };
+        let ends = [extent(f32::min, f32::INFINITY), extent(f32::max, f32::NEG_INFINITY)];
+        let three = |p: &[f32; 3]| p.map(|c| c.to_string());
+        out.line(&format!("float3[] extent = {}", tuples(ends.iter().map(three))));
+        out.line(&format!("int[] faceVertexCounts = [{}]", vec!["3"; piece.triangles.len()].join(",")));
+        let numbers: Vec<String> = piece.triangles.iter().flatten().map(u32::to_string).collect();
+        out.line(&format!("int[] faceVertexIndices = [{}]", numbers.join(",")));
+        let material = dress::material(piece.texture);
+        out.line(&format!("rel material:binding = </{ROOT}/{MATERIALS}/{material}>"));
+        let each = "(interpolation = \"vertex\")";
+        out.line(&format!("normal3f[] normals = {} {each}", tuples(piece.normals.iter().map(three))));
+        out.line(&format!("point3f[] points = {}", tuples(piece.positions.iter().map(three))));
+        let st = piece.uv.iter().map(|[u, v]| [dress::share_text(*u, false), dress::share_text(*v, true)]);
+        out.line(&format!("texCoord2f[] primvars:st = {} {each}", tuples(st)));
+        out.line("uniform token subdivisionScheme = \"none\"");
+        out.close();
+    }
+}
+
+/// Cubes of side 2, scaled: some readers take one of side 1 for one of side 2. Those that are not `shown` are guides.
+fn boxes(out: &mut Usda, solids: &[Solid], origin: &Point, shown: bool) {
     for s in solids {
         out.open(
             &format!("Cube \"{}\"", s.name),
@@ -268,6 +385,9 @@ fn boxes(out: &mut Usda, solids: &[Solid], origin: &Point) {
         out.line("float3[] extent = [(-1, -1, -1), (1, 1, 1)]");
         out.line(&format!("rel material:binding = </{ROOT}/{MATERIALS}/{}>", material(s.role)));
         out.line(&format!("color3f[] primvars:displayColor = [{}]", singles(&color(s.role)[..3])));
+        if !shown {
+            out.line("uniform token purpose = \"guide\"");
+        }
         out.line("double size = 2");
         let pose = local_pose(&s.shape, origin);
         place(out, &pose.translation.vector, &pose.rotation, Some(&s.shape.half));

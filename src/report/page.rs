@@ -1,5 +1,7 @@
 //! One self-contained page: the scene in 3D, the joints with their verdicts, every clip with its outcome.
 
+use std::io::Write;
+
 use base64::Engine;
 use minijinja::Environment;
 use serde::Serialize;
@@ -45,6 +47,14 @@ struct ClipRow<'a> {
     narration: &'a str,
     outcome: String,
     reason: String,
+}
+
+/// A file as text for the page: compressed, or the triangles of a look would weigh three times as much.
+fn packed(glb: &[u8]) -> Result<String> {
+    let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    let bytes = packer.write_all(glb).and_then(|()| packer.finish());
+    let bytes = bytes.map_err(|e| Error::Export(format!("page.html: {e}")))?;
+    Ok(base64::engine::general_purpose::STANDARD.encode(bytes))
 }
 
 /// The page as HTML.
@@ -118,7 +128,7 @@ pub fn render(
             "clips": clips,
             "files": files,
             "viewer_js": VIEWER,
-            "glb_base64": base64::engine::general_purpose::STANDARD.encode(glb),
+            "glb_base64": packed(glb)?,
         })))
         .map_err(fail)
 }

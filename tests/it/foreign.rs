@@ -24,10 +24,10 @@ static SAMPLE: LazyLock<Twin> = LazyLock::new(|| {
 /// The sample's files, as `paws twin` writes them.
 fn write_all(twin: &Twin, dir: &Path) {
     std::fs::write(dir.join("twin.json"), paws_twin::json::text(twin).unwrap()).unwrap();
-    std::fs::write(dir.join("scene.urdf"), export::urdf::write(twin).unwrap()).unwrap();
-    std::fs::write(dir.join("scene.xml"), export::mjcf::write(twin).unwrap()).unwrap();
-    std::fs::write(dir.join("kitchen.xml"), export::mjcf::write_model(twin).unwrap()).unwrap();
-    std::fs::write(dir.join("scene.glb"), export::gltf::write(twin, &[]).unwrap()).unwrap();
+    std::fs::write(dir.join("scene.urdf"), export::urdf::write(twin, None).unwrap()).unwrap();
+    std::fs::write(dir.join("scene.xml"), export::mjcf::write(twin, None).unwrap()).unwrap();
+    std::fs::write(dir.join("kitchen.xml"), export::mjcf::write_model(twin, None).unwrap()).unwrap();
+    std::fs::write(dir.join("scene.glb"), export::gltf::write(twin, None, &[]).unwrap()).unwrap();
 }
 
 fn read_text(name: &str, text: &str) -> Model {
@@ -44,8 +44,8 @@ fn failing(model: &Model) -> Vec<(u8, String)> {
 #[test]
 fn what_we_write_is_read_back_as_the_same_twin() {
     let twin = &*SAMPLE;
-    let urdf = read_text("scene.urdf", &export::urdf::write(twin).unwrap());
-    let mjcf = read_text("scene.xml", &export::mjcf::write(twin).unwrap());
+    let urdf = read_text("scene.urdf", &export::urdf::write(twin, None).unwrap());
+    let mjcf = read_text("scene.xml", &export::mjcf::write(twin, None).unwrap());
     for (model, handle_m) in [(urdf, 1e-5), (mjcf, 1e-9)] {
         let (back, notes) = to_twin(&model);
         let name = model.source.display();
@@ -152,7 +152,7 @@ fn expect(what: &str, model: &Model, points: &[u8], word: &str) {
 
 #[test]
 fn each_broken_urdf_fails_the_point_that_is_broken() {
-    let good = export::urdf::write(&SAMPLE).unwrap();
+    let good = export::urdf::write(&SAMPLE, None).unwrap();
     let door = part_of(JointKind::Revolute);
     let any = |joint: &str| joint.to_owned();
     let without = |from: &'static str, to: &'static str| move |text: &str| between(text, from, to, |_| String::new());
@@ -243,9 +243,9 @@ fn deep(metres: f64) -> Twin {
 fn fronts_that_stand_in_their_furniture_are_told_unless_excluded() {
     // The gap is 3 mm.
     let twin = deep(0.007);
-    let urdf = failing(&read_text("m.urdf", &export::urdf::write(&twin).unwrap()));
+    let urdf = failing(&read_text("m.urdf", &export::urdf::write(&twin, None).unwrap()));
     assert!(urdf.iter().any(|(id, f)| *id == 11 && f.contains("when closed")), "{urdf:?}");
-    let text = export::mjcf::write(&twin).unwrap();
+    let text = export::mjcf::write(&twin, None).unwrap();
     let mjcf = failing(&read_text("m.xml", &text));
     assert!(!mjcf.iter().any(|(_, f)| f.contains("when closed")), "{mjcf:?}");
     let contact = between(&text, "<contact>", "</contact>", |_| String::new());
@@ -255,7 +255,7 @@ fn fronts_that_stand_in_their_furniture_are_told_unless_excluded() {
 
 #[test]
 fn each_broken_mjcf_fails_the_point_that_is_broken() {
-    let good = export::mjcf::write(&SAMPLE).unwrap();
+    let good = export::mjcf::write(&SAMPLE, None).unwrap();
     expect(
         "degrees",
         &read_text("m.xml", &good.replace("angle=\"radian\"", "angle=\"degree\"")),
@@ -287,7 +287,7 @@ fn each_broken_mjcf_fails_the_point_that_is_broken() {
 #[test]
 fn hostile_files_are_refused_by_name() {
     let dir = tempfile::tempdir().unwrap();
-    let good = export::urdf::write(&SAMPLE).unwrap();
+    let good = export::urdf::write(&SAMPLE, None).unwrap();
     let write = |name: &str, bytes: &[u8]| std::fs::write(dir.path().join(name), bytes).unwrap();
     write("empty.urdf", b"");
     write("cut.urdf", &good.as_bytes()[..good.len() / 2]);

@@ -313,11 +313,11 @@ fn handles_are_in_the_same_place_in_every_format() {
     let twin = sample();
     let truth = of_model(&twin);
     let formats = [
-        ("urdf", of_urdf(&export::urdf::write(&twin).unwrap())),
-        ("mjcf", of_mjcf(&export::mjcf::write(&twin).unwrap())),
-        ("gltf", of_glb(&export::gltf::write(&twin, &[]).unwrap())),
+        ("urdf", of_urdf(&export::urdf::write(&twin, None).unwrap())),
+        ("mjcf", of_mjcf(&export::mjcf::write(&twin, None).unwrap())),
+        ("gltf", of_glb(&export::gltf::write(&twin, None, &[]).unwrap())),
         ("gltf with physics", of_physics(&export::gltf::write_physics(&twin).unwrap())),
-        ("usd", of_usda(&export::usd::write(&twin).unwrap())),
+        ("usd", of_usda(&export::usd::write(&twin, None).unwrap())),
     ];
     for (name, handles) in formats {
         assert_eq!(handles.len(), truth.len(), "{name}");
@@ -332,10 +332,10 @@ fn handles_are_in_the_same_place_in_every_format() {
 #[test]
 fn masses_are_density_times_volume_and_inertias_are_possible() {
     let twin = sample();
-    let robot = urdf_rs::read_from_string(&export::urdf::write(&twin).unwrap()).unwrap();
-    let usd = prims(&export::usd::write(&twin).unwrap());
+    let robot = urdf_rs::read_from_string(&export::urdf::write(&twin, None).unwrap()).unwrap();
+    let usd = prims(&export::usd::write(&twin, None).unwrap());
     let physics = json_of(&export::gltf::write_physics(&twin).unwrap());
-    let viewed = json_of(&export::gltf::write(&twin, &[]).unwrap());
+    let viewed = json_of(&export::gltf::write(&twin, None, &[]).unwrap());
     let node = |json: &serde_json::Value, name: &str| {
         json["nodes"].as_array().unwrap().iter().find(|n| n["name"] == name).unwrap().clone()
     };
@@ -385,7 +385,7 @@ fn the_room_stands_still_and_springs_carry_in_every_format_that_can_say_so() {
     let twin = furnished();
     let balanced = &twin.furniture[0].part.id;
 
-    let text = export::urdf::write(&twin).unwrap();
+    let text = export::urdf::write(&twin, None).unwrap();
     let robot = urdf_rs::read_from_string(&text).unwrap();
     let holds = |name: &str| {
         robot
@@ -397,13 +397,13 @@ fn the_room_stands_still_and_springs_carry_in_every_format_that_can_say_so() {
     assert_eq!(robot.links.iter().find(|l| l.name == "room").unwrap().collision.len(), 2);
     assert_eq!(text.matches("<limit").count(), twin.furniture.len(), "fixed joints have no limits");
 
-    let text = export::mjcf::write(&twin).unwrap();
+    let text = export::mjcf::write(&twin, None).unwrap();
     assert_eq!(text.matches("gravcomp=\"1\"").count(), 1);
     assert!(text.contains(&format!("<body name=\"{balanced}_link\"")) && text.contains("<body name=\"room\">"));
     let plane = text.lines().find(|l| l.contains("type=\"plane\"")).unwrap();
     assert_eq!(numbers(plane.split("pos=\"").nth(1).unwrap().split('"').next().unwrap())[2], -1.0);
 
-    let usd = prims(&export::usd::write(&twin).unwrap());
+    let usd = prims(&export::usd::write(&twin, None).unwrap());
     let with = |api: &str| usd.values().filter(|p| p.said.get("apiSchemas").is_some_and(|a| a.contains(api))).count();
     assert_eq!(with("PhysicsArticulationRootAPI"), twin.furniture.len());
     assert_eq!(with("PhysicsRigidBodyAPI"), 2 * twin.furniture.len());
@@ -425,7 +425,7 @@ fn the_room_stands_still_and_springs_carry_in_every_format_that_can_say_so() {
     assert!(nodes.iter().all(|n| n["extensions"].is_null() || n["scale"].is_null()));
     let floating = nodes.iter().filter(|n| n["extensions"][RIGID_BODIES]["motion"]["gravityFactor"] == 0.0).count();
     assert_eq!(floating, 1);
-    for glb in [physics, json_of(&export::gltf::write(&twin, &[]).unwrap())] {
+    for glb in [physics, json_of(&export::gltf::write(&twin, None, &[]).unwrap())] {
         let room = glb["nodes"].as_array().unwrap().iter().find(|n| n["name"] == "room").unwrap().clone();
         assert_eq!(room["children"].as_array().unwrap().len(), 2);
     }
@@ -434,7 +434,7 @@ fn the_room_stands_still_and_springs_carry_in_every_format_that_can_say_so() {
 #[test]
 fn usd_counts_hinges_in_degrees() {
     let twin = sample();
-    let usd = prims(&export::usd::write(&twin).unwrap());
+    let usd = prims(&export::usd::write(&twin, None).unwrap());
     for f in &twin.furniture {
         let prim = &usd[&format!("/kitchen/{0}_furniture/{0}", f.part.id)];
         let joint = &f.part.joint;
@@ -462,7 +462,8 @@ fn joints_of_elsewhere_become_files_in_every_format() {
     assert!(out.status.success(), "{}", crate::common::stderr(&out));
     let files = crate::common::tree(&dir.path().join("files"));
     let names: Vec<&str> = files.keys().map(String::as_str).collect();
-    let wanted = ["kitchen.xml", "physics.glb", "scene.glb", "scene.urdf", "scene.usda", "scene.xml", "twin.json"];
+    let wanted =
+        ["kitchen.xml", "physics.glb", "scene.glb", "scene.urdf", "scene.usda", "scene.usdz", "scene.xml", "twin.json"];
     assert_eq!(names, wanted);
     let twin: Twin = serde_json::from_slice(&files["twin.json"]).unwrap();
     assert_eq!(of_model(&twin).len(), 2);
@@ -493,14 +494,14 @@ fn other_loaders_read_what_we_write() {
     let dir = tempfile::tempdir().unwrap();
     let twin = sample();
     let urdf = dir.path().join("scene.urdf");
-    std::fs::write(&urdf, export::urdf::write(&twin).unwrap()).unwrap();
+    std::fs::write(&urdf, export::urdf::write(&twin, None).unwrap()).unwrap();
     let (robot, _) =
         rapier3d_urdf::UrdfRobot::from_file(&urdf, rapier3d_urdf::UrdfLoaderOptions::default(), None).unwrap();
     let moving = robot.joints.iter().filter(|j| !j.joint.limit_axes.is_empty()).count();
     assert_eq!(moving, 4);
 
     let mjcf = dir.path().join("scene.xml");
-    std::fs::write(&mjcf, export::mjcf::write(&twin).unwrap()).unwrap();
+    std::fs::write(&mjcf, export::mjcf::write(&twin, None).unwrap()).unwrap();
     let (robot, _) = rapier3d_mjcf::MjcfRobot::from_file(&mjcf, rapier3d_mjcf::MjcfLoaderOptions::default()).unwrap();
     assert!(robot.bodies.len() >= 8);
 }
@@ -539,11 +540,11 @@ fn a_twin_that_no_simulator_takes_is_refused() {
         let mut twin = good.clone();
         break_it(&mut twin);
         for error in [
-            export::urdf::write(&twin).unwrap_err().to_string(),
-            export::mjcf::write(&twin).unwrap_err().to_string(),
-            export::gltf::write(&twin, &[]).unwrap_err().to_string(),
+            export::urdf::write(&twin, None).unwrap_err().to_string(),
+            export::mjcf::write(&twin, None).unwrap_err().to_string(),
+            export::gltf::write(&twin, None, &[]).unwrap_err().to_string(),
             export::gltf::write_physics(&twin).unwrap_err().to_string(),
-            export::usd::write(&twin).unwrap_err().to_string(),
+            export::usd::write(&twin, None).unwrap_err().to_string(),
         ] {
             assert!(error.contains(word), "{error}");
         }

@@ -21,6 +21,7 @@ mod import_headsets;
 mod import_ros;
 mod import_tools;
 mod known_truth;
+mod looks;
 mod mjcf;
 mod models;
 mod physics;

@@ -79,6 +79,10 @@ fn twins_are_ready_for_every_simulator() {
         assert_ne!(result.status.code(), Some(2), "{name}: {}", stderr(&result));
         twins.push(out);
     }
+    // One with a look that is known.
+    crate::common::copy(&dir.path().join(&twins[0]), &dir.path().join("dressed"));
+    crate::looks::dress_up(&dir.path().join("dressed"));
+    twins.push("dressed".to_owned());
     twins.extend(kitchens(&python, dir.path()));
     let mut matrix = Command::new(&python);
     matrix.arg(script("matrix.py")).args(&twins).args(["--paws", env!("CARGO_BIN_EXE_paws")]).current_dir(dir.path());
@@ -90,6 +94,6 @@ fn twins_are_ready_for_every_simulator() {
     assert!(matrix.status.success(), "{}", text(&matrix));
     // Checks that never fail are worth nothing: faults put into the files must be noticed.
     let faults =
-        Command::new(&python).arg(script("mutations.py")).arg(&twins[0]).current_dir(dir.path()).output().unwrap();
+        Command::new(&python).arg(script("mutations.py")).arg("dressed").current_dir(dir.path()).output().unwrap();
     assert!(faults.status.success(), "{}", text(&faults));
 }

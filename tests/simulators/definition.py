@@ -206,6 +206,18 @@ class Twin:
         """How many boxes there are."""
         return sum(len(s) for s in self.solids.values()) + len(self.room)
 
+    @functools.cached_property
+    def look(self):
+        """Names of the textured meshes."""
+        return sorted(f.stem for f in (self.folder / "look").glob("*.obj"))
+
+    @functools.cached_property
+    def hidden(self):
+        """How many boxes meshes are shown for: a part's where it has some, all fixed ones where the room has."""
+        worn = {name.rsplit("_look_", 1)[0] for name in self.look}
+        parts = sum(len(p.solids) for p in self.parts if p.name in worn)
+        return parts + (sum(len(p.carcass) for p in self.parts) + len(self.room) if "room" in worn else 0)
+
     def seen_by(self, reader):
         """The twin as far as the reader's format can tell it."""
         if reader.springs:

@@ -47,6 +47,9 @@ for (const file of files) {
     root: named(json.nodes[json.scenes[json.scene].nodes[0]].name)?.quaternion.toArray(),
     required: json.extensionsRequired ?? [],
     used: json.extensionsUsed ?? [],
+    textured: (json.meshes ?? [])
+      .filter((m) => m.primitives.every((p) => json.materials[p.material].pbrMetallicRoughness.baseColorTexture))
+      .map((m) => m.name),
     names: json.nodes.map((n) => n.name),
     raw: { nodes: json.nodes, extensions: json.extensions ?? {} },
     nodes,

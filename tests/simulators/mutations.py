@@ -53,6 +53,14 @@ MUTATIONS = (
     ("mass of another part", "glTF", rb'"mass":\d', b'"mass":9', 3, "validator, physics.glb"),
     ("not +Y up", "glTF", rb'"rotation":\[-0.70710\d*,0.0,0.0,', b'"rotation":[0.0,0.0,0.0,', 7, "three.js"),
 )
+# The same for twins with a look.
+OF_LOOKS = (
+    ("a mesh elsewhere", "URDF", r'filename="look/', 'filename="meshes/', 5, "the text"),
+    ("a mesh that collides", "MJCF", r'class="visual" type="mesh"', 'class="collision" type="mesh"', 5, "the text"),
+    ("a material without a picture", "MJCF", r' texture="[^"]*"', "", 6, "MuJoCo"),
+    ("a picture elsewhere", "USD", r"@\./look/", "@./looks/", 8, "usd-core"),
+    ("a box before a mesh", "USD", r'uniform token purpose = "guide"', "", 8, "usd-core"),
+)
 
 
 def axis_negated(match):
@@ -87,7 +95,8 @@ def main():
     tools = pathlib.Path(sys.prefix).parent
     readers = matrix.readers(tools, None)[0]
     missed = 0
-    for what, format, pattern, replacement, point, simulator in MUTATIONS:
+    mutations = MUTATIONS + (OF_LOOKS if definition.Twin(source).look else ())
+    for what, format, pattern, replacement, point, simulator in mutations:
         with tempfile.TemporaryDirectory() as folder:
             copy = pathlib.Path(folder) / "twin"
             shutil.copytree(source, copy)

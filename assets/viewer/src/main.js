@@ -1,6 +1,7 @@
 import {
   AmbientLight,
   Box3,
+  BoxGeometry,
   BufferGeometry,
   Color,
   ConeGeometry,
@@ -15,6 +16,7 @@ import {
   Matrix4,
   Mesh,
   MeshBasicMaterial,
+  MeshStandardMaterial,
   NeutralToneMapping,
   PerspectiveCamera,
   PMREMGenerator,
@@ -32,6 +34,8 @@ import { STYLE } from "./style.js";
 const BACKGROUND = 0xf3f4f6;
 const ACCENT = 0x2563eb;
 const AXIS_COLOUR = 0xea580c;
+const COLLISION_COLOUR = 0x0d9488;
+const ASSUMED_COLOUR = 0xd97706;
 const UP = new Vector3(0, 1, 0);
 const TURN = 0.52;
 const VERDICTS = ["pass", "fail", "undetermined"];
@@ -146,6 +150,26 @@ class Joint {
   }
 }
 
+/** What a node of the scene stands for: "look" (a textured mesh), "box" (of the model), or nothing in particular. */
+function kindOf(node) {
+  if (node.userData?.role !== undefined) return "box";
+  return [node.material].flat().some((m) => m?.map) ? "look" : "";
+}
+
+/** Boxes that textured meshes hide have nodes without meshes: their scale is their size. */
+function addHiddenBoxes(root) {
+  const empty = [];
+  root.traverse((node) => {
+    if (node.userData?.role !== undefined && !node.isMesh && node.children.length === 0) empty.push(node);
+  });
+  const cube = new BoxGeometry(1, 1, 1);
+  for (const node of empty) {
+    const mesh = new Mesh(cube, new MeshStandardMaterial({ color: 0xb8babc, roughness: 0.7 }));
+    mesh.userData = node.userData;
+    node.add(mesh);
+  }
+}
+
 /** Finds the pivots and gives each one the meshes that it moves and no joint below it does. */
 function findJoints(root) {
   const joints = [];
@@ -205,6 +229,16 @@ function corners(box) {
 function dressMeshes(meshes) {
   const outline = new LineBasicMaterial({ color: 0x111827, transparent: true, opacity: 0.32 });
   for (const mesh of meshes) {
+    if (kindOf(mesh) === "look") {
+      // Its colours were seen in the room's light; another light would be one too many.
+      const seen = (material) => {
+        const copy = new MeshBasicMaterial({ map: material.map, toneMapped: false });
+        copy.userData.plainColour = copy.color.clone();
+        return copy;
+      };
+      mesh.material = Array.isArray(mesh.material) ? mesh.material.map(seen) : seen(mesh.material);
+      continue;
+    }
     const own = (material) => {
       const copy = material.clone();
       // Pushes the faces back a little, or they flicker through their own outline.
@@ -230,8 +264,10 @@ function dressMeshes(meshes) {
 function tint(joint, on) {
   for (const mesh of joint.meshes) {
     for (const material of [mesh.material].flat()) {
-      if (!material.emissive) continue;
-      if (on) {
+      if (!material.emissive) {
+        material.color.copy(material.userData.plainColour);
+        if (on) material.color.lerp(new Color(ACCENT), 0.35);
+      } else if (on) {
         // Light alone cannot colour a white front, so the paint is turned towards the accent as well.
         material.emissive.setHex(ACCENT);
         material.emissiveIntensity = 0.3;
@@ -242,6 +278,27 @@ function tint(joint, on) {
         material.color.copy(material.userData.plainColour);
       }
     }
+  }
+}
+
+/**
+ * Shows a box as what the switches say: solid, as a body to collide with (seen through), marked as assumed, or not at all.
+ * The plain colour stays what a highlight goes back to.
+ */
+function dressBox(mesh, show) {
+  const assumed = show.assumed && mesh.userData.seen === false;
+  mesh.visible = show.boxes || show.collision || assumed;
+  for (const material of [mesh.material].flat()) {
+    const { userData } = material;
+    userData.ownColour ??= userData.plainColour.clone();
+    userData.plainColour.copy(userData.ownColour);
+    if (assumed) userData.plainColour.setHex(ASSUMED_COLOUR);
+    else if (show.collision) userData.plainColour.setHex(COLLISION_COLOUR);
+    material.color.copy(userData.plainColour);
+    if (material.transparent === show.boxes) material.needsUpdate = true;
+    material.transparent = !show.boxes;
+    material.opacity = show.boxes ? 1 : 0.3;
+    material.depthWrite = show.boxes;
   }
 }
 
@@ -465,14 +522,20 @@ class Viewer {
     this.hot = null;
     this.userMoved = false;
 
+    addHiddenBoxes(model);
     const { joints, meshes } = findJoints(model);
     this.joints = joints;
     this.meshes = meshes;
+    this.looks = meshes.filter((mesh) => kindOf(mesh) === "look");
+    this.boxes = meshes.filter((mesh) => kindOf(mesh) === "box");
+    const dressed = this.looks.length > 0;
+    this.show = { look: dressed, boxes: !dressed, collision: false, assumed: false };
     model.updateMatrixWorld(true);
 
     this.buildScene(model);
     this.buildPage();
     this.buildControls();
+    this.refreshLayers();
 
     if (Number.isFinite(options.open)) {
       for (const joint of joints) joint.set(joint.closed + options.open * (1 - joint.closed));
@@ -579,7 +642,7 @@ class Viewer {
       root.classList.remove("pv-is-lost");
       this.draw();
     });
-    stage.append(canvas, hint, home, lost);
+    stage.append(canvas, hint, home, this.buildSwitches(), lost);
 
     const panel = element("div", "pv-panel");
     const head = element("div", "pv-head");
@@ -605,6 +668,50 @@ class Viewer {
     root.append(stage, panel);
     this.stage = stage;
     this.panel = panel;
+  }
+
+  /** What is shown of the scene; a scene that is not made of our boxes has nothing to choose from. */
+  buildSwitches() {
+    const group = element("div", "pv-switches");
+    group.setAttribute("role", "group");
+    group.setAttribute("aria-label", "What is shown");
+    const assumed = this.boxes.some((mesh) => mesh.userData.seen === false);
+    const layers = [
+      ["look", "Textures", "Colours and surfaces as they were seen", this.looks.length > 0],
+      ["boxes", "Boxes", "The model: what carries masses and contacts", this.boxes.length > 0],
+      ["collision", "Collision", "The same boxes, seen through", this.boxes.length > 0],
+      ["assumed", "Assumed", "Boxes that nobody saw", assumed],
+    ];
+    for (const [key, label, title, there] of layers) {
+      if (!there) continue;
+      const button = element("button", "pv-button pv-switch", label);
+      button.type = "button";
+      button.title = title;
+      button.dataset.layer = key;
+      button.addEventListener("click", () => this.setLayer(key, !this.show[key]));
+      group.append(button);
+    }
+    this.switches = group;
+    return group;
+  }
+
+  setLayer(key, on) {
+    if (!(key in this.show)) return;
+    this.show[key] = Boolean(on);
+    // Both at once would flicker through each other.
+    if (on && key === "look") this.show.boxes = false;
+    if (on && key === "boxes") this.show.look = false;
+    this.refreshLayers();
+  }
+
+  refreshLayers() {
+    for (const mesh of this.looks) mesh.visible = this.show.look;
+    for (const mesh of this.boxes) dressBox(mesh, this.show);
+    if (this.hot) tint(this.hot, true);
+    for (const button of this.switches.children) {
+      button.setAttribute("aria-pressed", String(this.show[button.dataset.layer]));
+    }
+    this.invalidate();
   }
 
   buildRow(joint) {
@@ -708,7 +815,8 @@ class Viewer {
     );
     const ray = new Raycaster();
     ray.setFromCamera(at, this.camera);
-    const hit = ray.intersectObjects(this.meshes, false)[0];
+    // Boxes stand for what is shown before them, and are quicker to hit than a hundred thousand triangles.
+    const hit = ray.intersectObjects(this.boxes.length > 0 ? this.boxes : this.meshes, false)[0];
     return hit?.object.userData.pawsJoint ?? null;
   }
 
@@ -854,6 +962,10 @@ class Viewer {
         const joint = find(id);
         if (joint) this.moveTo(joint, 1);
       },
+      /** Shows a layer ("look", "boxes", "collision", "assumed") or hides it. */
+      show: (layer, on) => this.setLayer(layer, on),
+      /** Which layers are shown. */
+      shown: () => ({ ...this.show }),
       openAll: () => this.moveAll(true),
       closeAll: () => this.moveAll(false),
       /** Where a joint's part is now: the middle of its bounds in the world. For tests. */

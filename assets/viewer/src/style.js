@@ -9,6 +9,9 @@ export const STYLE = `
 .pv-stage canvas:active { cursor: grabbing; }
 .pv-hint { position: absolute; left: 14px; bottom: 11px; right: 14px; font-size: 12px; color: #6b7280; pointer-events: none; }
 .pv-home { position: absolute; left: 12px; top: 12px; }
+.pv-switches { position: absolute; right: 12px; top: 12px; display: flex; flex-wrap: wrap; justify-content: flex-end; gap: 6px; max-width: 70%; }
+.pv-switch[aria-pressed="true"] { background: #1d4ed8; border-color: #1d4ed8; color: #fff; }
+.pv-switch[aria-pressed="true"]:hover { background: #1e40af; color: #fff; }
 .pv-button { font: inherit; font-size: 12.5px; line-height: 1; padding: 7px 10px; border: 1px solid #d1d5db; border-radius: 8px;
   background: #fff; color: #1f2937; cursor: pointer; white-space: nowrap; }
 .pv-button:hover:not(:disabled) { border-color: #2563eb; color: #1d4ed8; }
@@ -55,7 +58,7 @@ export const STYLE = `
   .pv-hint { font-size: 11.5px; }
 }
 @media print {
-  .pv-panel, .pv-hint, .pv-home { display: none; }
+  .pv-panel, .pv-hint, .pv-home, .pv-switches { display: none; }
   .pv { break-inside: avoid; background: none; border: 0; }
   .pv-stage { height: auto; }
   .pv-stage canvas { height: auto; max-height: 125mm; }

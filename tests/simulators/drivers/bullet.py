@@ -86,6 +86,11 @@ class Urdf(Posed, Engine):
             yield f"links {sorted(lost)} are gone"
         if bullet.getDynamicsInfo(self.kitchen, -1, physicsClientId=self.world)[0] != 0:
             yield "the base is free"
+        flags = bullet.VISUAL_SHAPE_DATA_TEXTURE_UNIQUE_IDS
+        shown = bullet.getVisualShapeData(self.kitchen, flags=flags, physicsClientId=self.world)
+        meshes = [s for s in shown if s[2] == bullet.GEOM_MESH]
+        if len(meshes) != len(self.twin.look) or any(s[8] < 0 for s in meshes):
+            yield f"{len(meshes)} meshes, the look has {len(self.twin.look)}; or one has no picture"
 
     def put(self, positions):
         for name, j in self.joint.items():

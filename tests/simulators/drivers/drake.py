@@ -37,6 +37,7 @@ class Drake(Posed, Engine):
     most = 2
     harmless = {
         "does not currently support non-zero joint friction": "friction is for the engines that have it",
+        "The texture element is not supported": "of no effect on the physics",
         "tag '(light|site|keyframe|visual)' found .* unsupported": "of no effect on the physics",
         "attribute '(integrator|frictionloss)' .* unsupported": "Drake has its own integrator and no joint friction",
         "attribute 'gravcomp' .* unsupported": "it has no springs that carry a part",

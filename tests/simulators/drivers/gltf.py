@@ -106,8 +106,10 @@ class Three(Gltf):
             if f"{p.name}_handle" not in all_names:
                 yield f"no node {p.name}_handle"
         meshes = sum(n["mesh"] for n in self.said["nodes"])
-        if meshes != self.twin.boxes:
-            yield f"{meshes} boxes, the twin has {self.twin.boxes}"
+        if meshes != self.twin.boxes - self.twin.hidden + len(self.twin.look):
+            yield f"{meshes} meshes, the twin has {self.twin.boxes} boxes, of which {self.twin.hidden} are hidden"
+        if sorted(self.said["textured"]) != self.twin.look:
+            yield f"{len(self.said['textured'])} textured meshes, the look has {len(self.twin.look)}"
 
     def repeated(self, twin):
         return rewritten(twin, self.format)

@@ -68,8 +68,18 @@ class MuJoCo(Posed, Engine):
         boxes = self.model.geom_type == mujoco.mjtGeom.mjGEOM_BOX
         visual = boxes & (self.model.geom_contype == 0) & (self.model.geom_conaffinity == 0)
         wanted = self.twin.boxes
-        if visual.sum() != wanted or (boxes & ~visual).sum() != wanted:
-            yield f"{visual.sum()} visual and {(boxes & ~visual).sum()} colliding boxes, the twin has {wanted}"
+        shown = wanted - self.twin.hidden
+        if visual.sum() != shown or (boxes & ~visual).sum() != wanted:
+            yield f"{visual.sum()} visual and {(boxes & ~visual).sum()} colliding boxes, not {shown} and {wanted}"
+        meshes = np.flatnonzero(self.model.geom_type == mujoco.mjtGeom.mjGEOM_MESH)
+        if len(meshes) != len(self.twin.look):
+            yield f"{len(meshes)} meshes, the look has {len(self.twin.look)}"
+        if self.model.geom_contype[meshes].any() or self.model.geom_conaffinity[meshes].any():
+            yield "a mesh collides"
+        # A geom without a material has number -1, a material without a picture too.
+        materials = self.model.geom_matid[meshes]
+        if (materials < 0).any() or (self.model.mat_texid[materials].max(axis=1, initial=-1) < 0).any():
+            yield "a mesh without a picture"
 
     def put(self, positions):
         mujoco.mj_resetData(self.model, self.data)

@@ -74,9 +74,10 @@ def rewritten(twin, format):
     with tempfile.TemporaryDirectory() as folder:
         command = [PAWS, "export", twin.folder, "--format", format.lower(), "--out", folder]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-        for again in sorted(pathlib.Path(folder).iterdir()):
-            if again.read_bytes() != (twin.folder / again.name).read_bytes():
-                yield f"paws export writes another {again.name} than paws twin"
+        for again in sorted(f for f in pathlib.Path(folder).rglob("*") if f.is_file()):
+            name = again.relative_to(folder)
+            if again.read_bytes() != (twin.folder / name).read_bytes():
+                yield f"paws export writes another {name} than paws twin"
 
 
 class Text(Reader):
@@ -175,6 +176,9 @@ class Urdf(Text):
             shapes = self.root.findall(f"link[@name='{part.link}']/collision")
             if not any("handle" in s.get("name", "") for s in shapes):
                 yield f"{part.link}: no handle among its collision shapes"
+        files = sorted(pathlib.Path(m.get("filename")) for m in self.root.iterfind("link/visual/geometry/mesh"))
+        if [f.stem for f in files] != self.twin.look or not all((self.path.parent / f).is_file() for f in files):
+            yield f"{len(files)} meshes are shown, the look has {len(self.twin.look)}"
         for shape in self.root.iterfind("link/collision/geometry/*"):
             if shape.tag != "box":
                 yield f"a {shape.tag} collides: its convex hull would"
@@ -223,8 +227,14 @@ class Mjcf(Text):
                 yield f"{part.link}: no site {part.name}_handle"
             elif not any("handle" in g.get("name", "") for g in found.iterfind("geom")):
                 yield f"{part.link}: no handle geom"
-        if self.root.find("asset/mesh") is not None:
-            yield "a mesh: MuJoCo collides with its convex hull"
+        shown = [g for g in self.root.iterfind(".//geom") if g.get("type") == "mesh"]
+        if any(g.get("class") != "visual" for g in shown):
+            yield "a mesh collides: MuJoCo takes its convex hull"
+        if sorted(g.get("mesh") for g in shown) != self.twin.look:
+            yield f"{len(shown)} meshes are shown, the look has {len(self.twin.look)}"
+        for asset in self.root.iterfind("asset/*[@file]"):
+            if not (self.path.parent / asset.get("file")).is_file():
+                yield f"{asset.get('file')} is not there"
 
     def own(self):
         compiler = self.root.find("compiler")

@@ -11,7 +11,7 @@ import tempfile
 
 import numpy as np
 from definition import Body, Limits, Reader, Unanswered, all_but, off
-from pxr import Usd, UsdGeom, UsdPhysics, UsdValidation
+from pxr import Usd, UsdGeom, UsdPhysics, UsdShade, UsdValidation
 
 from .text import FILES, SAFE, rewritten
 
@@ -192,8 +192,26 @@ class UsdCore(Stage):
     def repeated(self, twin):
         return rewritten(twin, self.format)
 
+    def looks(self, stage):
+        """What a stage lacks of the look."""
+        meshes = sorted(p.GetName() for p in stage.Traverse() if p.IsA(UsdGeom.Mesh))
+        if meshes != self.twin.look:
+            yield f"{len(meshes)} meshes, the look has {len(self.twin.look)}"
+        for mesh in (p for p in stage.Traverse() if p.IsA(UsdGeom.Mesh)):
+            material = UsdShade.MaterialBindingAPI(mesh).ComputeBoundMaterial()[0].GetPrim()
+            picture = stage.GetPrimAtPath(f"{material.GetPath()}/picture").GetAttribute("inputs:file").Get()
+            if not picture.resolvedPath or not UsdGeom.PrimvarsAPI(mesh).GetPrimvar("st").HasValue():
+                yield f"{mesh.GetName()}: no picture, or no texture coordinates"
+        guides = [p for p in stage.Traverse() if p.IsA(UsdGeom.Cube) and UsdGeom.Imageable(p).ComputePurpose() == "guide"]
+        if len(guides) != self.twin.hidden:
+            yield f"{len(guides)} boxes are guides, not {self.twin.hidden}"
+
     def own(self):
         yield from super().own()
+        yield from self.looks(self.stage)
+        package = self.twin.folder / "scene.usdz"
+        if package.exists():
+            yield from (f"{package.name}: {fault}" for fault in self.looks(Usd.Stage.Open(str(package))))
         parsed = {
             kind: dict(zip((str(path) for path in paths), descriptions))
             for kind, (paths, descriptions) in UsdPhysics.LoadUsdPhysicsFromRange(self.stage, ["/"]).items()

@@ -19,6 +19,10 @@ class Urdf(Posed, Reader):
         with captured() as said:
             self.robot = yourdfpy.URDF.load(str(twin.folder / FILES["URDF"]))
             valid = self.robot.validate()
+        shapes = self.robot.scene.geometry
+        bare = [n for n in self.twin.look if getattr(shapes[n].visual.material, "image", None) is None]
+        if bare:
+            valid, self.robot.errors = False, [*self.robot.errors, f"no picture on {bare}"]
         self.warnings = said.text if valid else f"{said.text}\nvalidate() is False: {self.robot.errors}"
 
     def limits(self):
