@@ -101,11 +101,8 @@ def lifted(recording, frames, read_depth):
         pairs = [(d, p) for d, p in pairs if p is not None]
         kept.append([d for d, _ in pairs])
         placed.append([p for _, p in pairs])
-    followed = tracks.track(kept)
-    lonely = {
-        t.members[0] for t in followed if len(t.members) == 1 and not _is_sure(kept[t.members[0][0]][t.members[0][1]])
-    }
-    followed = [t for t in followed if t.members[0] not in lonely or len(t.members) > 1]
+    width = 2 * camera.cx + 1
+    followed = [t for t in tracks.track(kept, [f["time"] for f in recording.frames], width) if not _is_doubtful(t, kept, placed)]
     out = []
     for number, (frame, names) in enumerate(zip(recording.frames, tracks.sides(kept, followed))):
         hands = []
@@ -129,8 +126,11 @@ def lifted(recording, frames, read_depth):
     return out, palm_m, palm_std
 
 
-def _is_sure(detection):
-    return detection["score"] >= ALONE and detection.get("seen", 1) > 1
+def _is_doubtful(track, kept, placed):
+    """Whether one picture alone shows a hand, and nothing else speaks for it."""
+    number, i = track.members[0]
+    one = len(track.members) == 1 and placed[number][i].by != "depth"
+    return one and (kept[number][i]["score"] < ALONE or kept[number][i]["seen"] < 2)
 
 
 def run(folder, cache, device="cpu", weights=None, redo=False, say=print, progress=lambda what, done, count: None):
@@ -179,7 +179,8 @@ def run(folder, cache, device="cpu", weights=None, redo=False, say=print, progre
 
     count = len(paths)
     found = first.run(count, look, lambda done, all_: progress("hands", done, all_))
-    wanted = tracks.gaps(found, tracks.track(found))
+    times = [frame["time"] for frame in recording.frames]
+    wanted = tracks.gaps(found, times, tracks.track(found, times, 2 * recording.camera.cx + 1))
     second = Stream(cache, "hands-again", {**facts, "upstream": first.key})
     if redo:
         second.forget()
