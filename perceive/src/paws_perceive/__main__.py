@@ -1,9 +1,11 @@
 """`python -m paws_perceive plan|poses|hands`: one stream at a time, for `paws perceive` and for people."""
 
 import argparse
+import errno
 import json
 import os
 import sys
+import traceback
 
 from . import Failure, __version__, plan
 
@@ -76,14 +78,21 @@ def main():
     # Words of libraries that say nothing to the user.
     os.environ.setdefault("GLOG_minloglevel", "2")
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "2")
+    args = parser().parse_args()
     try:
-        return act(parser().parse_args())
+        return act(args)
     except Failure as failure:
         say(str(failure))
+    except OSError as error:
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        way = "the disk is full: make room, or name another folder with --cache; run the same command again" if full else error.strerror
+        say(f"{error.filename or getattr(args, 'cache', args.source)}: {way}")
     except MemoryError:
         say("out of memory: close other programs; what is finished stays in the cache, run the same command again")
     except KeyboardInterrupt:
         say("stopped; what is finished stays in the cache, run the same command again")
+    except Exception:  # An exit code of 1 would say that it ran.
+        traceback.print_exc()
     return ERROR
 
 

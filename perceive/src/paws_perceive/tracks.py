@@ -110,8 +110,9 @@ def gaps(frames, times, tracks):
         for number in range(max(first - 2, 0), min(last + 2, len(frames) - 1) + 1):
             if number in seen:
                 continue
-            near = sorted(seen, key=lambda f: abs(f - number))[:2]
-            if abs(times[near[0]] - times[number]) > HIDDEN_SECS:
+            sides_of = [max((f for f in seen if f < number), default=None), min((f for f in seen if f > number), default=None)]
+            near = [f for f in sides_of if f is not None and abs(times[f] - times[number]) <= HIDDEN_SECS]
+            if not near:
                 continue
             spots = [(frames[f][seen[f]], 1 / abs(f - number)) for f in near]
             total = sum(w for _, w in spots)

@@ -4,8 +4,6 @@ import io
 import pathlib
 import zipfile
 
-import numpy as np
-
 from . import About, package, weights_of
 
 DETECTOR = "modules/palm_detection/palm_detection_full.tflite"
@@ -45,6 +43,8 @@ class Network:
 
     def run(self, image):
         """Hands in a square RGB image: `right` (how likely it is a right hand), `score`, `pixels` (21 x 2), `shape` (21 x 3)."""
+        import numpy as np  # Not needed to say what this is.
+
         rows, columns = image.shape[:2]
         held = self._mediapipe.Image(image_format=self._mediapipe.ImageFormat.SRGB, data=np.ascontiguousarray(image))
         found = self._landmarker.detect(held)
