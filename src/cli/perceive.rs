@@ -160,7 +160,7 @@ pub fn run(args: &PerceiveArgs) -> anyhow::Result<Answer> {
                     shown(ours)
                 );
             }
-            sources(args, options)
+            sources(args, &options)
         }
     }
 }
@@ -176,15 +176,16 @@ fn recording(args: &PerceiveArgs, source: &Path) -> anyhow::Result<Answer> {
     }
     let has_hands = HANDS.iter().any(|name| source.join(name).is_file());
     let wanted = !has_hands || args.redo.contains(&Stream::Hands);
+    let python = wanted.then(|| Python::find(args.python.as_deref())).transpose()?;
     let output = Output::new(out, Kind::Recording, &[source])?;
     copy(source, "", &output, wanted)?;
-    if !wanted {
-        eprintln!("{}: has poses and hands; --redo hands makes its hands anew", shown(source));
-        output.finish()?;
-        print(&format!("{}\n", shown(out)))?;
-        return Ok(Answer::Yes);
-    }
-    let found = hands(args, out, &output)?;
+    let found = match &python {
+        Some(python) => hands(args, python, out, &output)?,
+        None => {
+            eprintln!("{}: has poses and hands; --redo hands makes its hands anew", shown(source));
+            true
+        }
+    };
     output.finish()?;
     print(&format!("{}\n", shown(out)))?;
     Ok(if found { Answer::Yes } else { Answer::No })
@@ -215,35 +216,43 @@ fn copy(source: &Path, below: &str, output: &Output, without_hands: bool) -> any
 }
 
 /// Whatever `paws import` reads.
-fn sources(args: &PerceiveArgs, options: Options) -> anyhow::Result<Answer> {
+fn sources(args: &PerceiveArgs, options: &Options) -> anyhow::Result<Answer> {
     let mut sources = import::resolve(&args.sources)?;
-    let mut captures = read(&sources, &options)?;
-    let facts = Facts::of(&captures, &options);
+    let mut captures = read(&sources, options)?;
+    let facts = Facts::of(&captures, options);
     if args.plan {
         return planned(args, &[OsStr::new("--facts"), OsStr::new(&facts.text())]);
     }
     let Some(out) = &args.out else { bail!("--out DIR is needed") };
+    // Told before hours of work, not after them. Hands that are there may yet meet no frame.
+    let python = Python::find(args.python.as_deref());
+    let redo_hands = args.redo.contains(&Stream::Hands);
+    let python = if facts.poses && facts.hands && !redo_hands { python.ok() } else { Some(python?) };
     let inputs: Vec<PathBuf> = sources.iter().map(|(_, path)| path.clone()).collect();
     let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
     let output = Output::new(out, Kind::Recording, &inputs)?;
     let mut notes = Vec::new();
     if !facts.poses {
-        notes.push(posed(args, out, &mut sources, &options)?);
-        captures = read(&sources, &options)?;
+        let Some(python) = &python else { bail!("poses need Python") };
+        notes.push(posed(args, python, out, &mut sources, options)?);
+        captures = read(&sources, options)?;
     } else if args.redo.contains(&Stream::Poses) {
         bail!("--redo poses: the sources have poses of their own, which are taken");
     }
-    if args.redo.contains(&Stream::Hands) {
+    if redo_hands {
         captures.iter_mut().for_each(|c| c.hands = None);
     }
-    let mut imported = assemble(captures, &options)?;
+    let mut imported = assemble(captures, options)?;
     imported.report.changes.extend(notes);
     let steps = Steps::new();
     import::write(&mut imported, &output, &steps)?;
     steps.finish();
     let mut found = true;
     if imported.hands.is_empty() {
-        found = hands(args, out, &output)?;
+        let Some(python) = &python else {
+            bail!("none of the given hands meets a frame, and making others needs uv or Python")
+        };
+        found = hands(args, python, out, &output)?;
         imported.report.missing.retain(|m| !(found && m.what == Stream::Hands.name()));
     }
     output.finish()?;
@@ -263,6 +272,7 @@ fn read(sources: &[(&'static Format, PathBuf)], options: &Options) -> anyhow::Re
 /// is to be noted.
 fn posed(
     args: &PerceiveArgs,
+    python: &Python,
     out: &Path,
     sources: &mut Vec<(&'static Format, PathBuf)>,
     options: &Options,
@@ -275,8 +285,7 @@ fn posed(
     let cache = cache(args, out)?;
     let answer = cache.join("poses.json");
     let (format, source) = sources.remove(at);
-    let python = Python::find(args.python.as_deref(), "poses")?;
-    let mut command = python.command();
+    let mut command = python.command(Some(Stream::Poses.name()));
     command.arg("poses").arg(&source).arg("--out").arg(&answer).arg("--cache").arg(&cache);
     command.args(common(args));
     if options.fps > 0.0 {
@@ -303,12 +312,11 @@ fn posed(
 }
 
 /// Makes the hands of the staged recording; whether there are any.
-fn hands(args: &PerceiveArgs, out: &Path, output: &Output) -> anyhow::Result<bool> {
+fn hands(args: &PerceiveArgs, python: &Python, out: &Path, output: &Output) -> anyhow::Result<bool> {
     let cache = cache(args, out)?;
     let written = output.path("hands.json")?;
     let Some(folder) = written.parent() else { bail!("a folder for hands") };
-    let python = Python::find(args.python.as_deref(), "hands")?;
-    let mut command = python.command();
+    let mut command = python.command(Some(Stream::Hands.name()));
     command.arg("hands").arg(folder).arg("--cache").arg(&cache);
     command.args(common(args));
     if let Some(weights) = &args.weights {
@@ -344,7 +352,7 @@ fn cache(args: &PerceiveArgs, out: &Path) -> anyhow::Result<PathBuf> {
 /// Prints what would run.
 fn planned(args: &PerceiveArgs, what: &[&OsStr]) -> anyhow::Result<Answer> {
     let python = Python::plain(args.python.as_deref())?;
-    let mut command = python.command();
+    let mut command = python.command(None);
     command.arg("plan").args(what).args(common(args));
     let text = package::said(command)?;
     print(&text)?;

@@ -39,10 +39,8 @@ const INSTALL: &str = "install uv (https://docs.astral.sh/uv), which gets Python
 /// Who runs the package.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Runner {
-    /// uv, with the packages of an extra.
-    Uv(&'static str),
-    /// uv, without any package.
-    UvAlone,
+    /// uv, which gets the packages of an extra.
+    Uv,
     /// A Python that has what it has.
     Python(PathBuf),
 }
@@ -55,11 +53,11 @@ pub struct Python {
 }
 
 impl Python {
-    /// For a stream's network: the given Python, else uv, else the installed Python, which then has to have the packages.
-    pub fn find(given: Option<&Path>, extra: &'static str) -> anyhow::Result<Self> {
+    /// For networks: the given Python, else uv, else the installed Python, which then has to have the packages.
+    pub fn find(given: Option<&Path>) -> anyhow::Result<Self> {
         let runner = match given {
             Some(python) => Runner::Python(checked(python)?),
-            None if runs("uv") => Runner::Uv(extra),
+            None if runs("uv") => Runner::Uv,
             None => Runner::Python(installed()?),
         };
         Ok(Self { runner, package: unpacked()? })
@@ -71,28 +69,25 @@ impl Python {
             Some(python) => Runner::Python(checked(python)?),
             None => match installed() {
                 Ok(python) => Runner::Python(python),
-                Err(_) if runs("uv") => Runner::UvAlone,
+                Err(_) if runs("uv") => Runner::Uv,
                 Err(error) => return Err(error),
             },
         };
         Ok(Self { runner, package: unpacked()? })
     }
 
-    /// The package's command, without arguments.
-    pub fn command(&self) -> Command {
-        let mut command = match &self.runner {
-            Runner::Python(python) => Command::new(python),
-            Runner::UvAlone => {
+    /// The package's command, without arguments. `extra`: whose packages it needs, of `pyproject.toml`; `None`: none.
+    pub fn command(&self, extra: Option<&str>) -> Command {
+        let mut command = match (&self.runner, extra) {
+            (Runner::Python(python), _) => Command::new(python),
+            (Runner::Uv, None) => {
                 let mut uv = Command::new("uv");
                 uv.args(["run", "--no-project", "--quiet", "--", "python"]);
                 uv
             }
-            Runner::Uv(extra) => {
+            (Runner::Uv, Some(extra)) => {
                 if !self.package.join(".venv").is_dir() {
-                    eprintln!(
-                        "uv gets Python packages for {extra} now, some 100 MB (uv.lock in {})",
-                        shown(&self.package)
-                    );
+                    eprintln!("uv gets Python packages for {extra} now (uv.lock in {})", shown(&self.package));
                 }
                 let mut uv = Command::new("uv");
                 uv.args(["run", "--frozen", "--no-dev", "--extra", extra, "--project"]).arg(&self.package);

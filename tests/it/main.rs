@@ -22,6 +22,7 @@ mod import_tools;
 mod known_truth;
 mod mjcf;
 mod models;
+mod perceive;
 mod physics;
 mod real_recordings;
 mod robust;

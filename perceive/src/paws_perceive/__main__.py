@@ -7,7 +7,7 @@ import os
 import sys
 import traceback
 
-from . import Failure, __version__, plan
+from . import Failure, __version__, adapters, plan
 
 # Exit codes as those of `paws`: done, ran but found nothing, error.
 DONE, NOTHING, ERROR = 0, 1, 2
@@ -56,6 +56,7 @@ def act(args):
         sys.stdout.write(plan.text(facts, args.device, args.redo))
         return DONE
     redo = args.command in args.redo
+    adapters.package("numpy", adapters.of(args.command).ABOUT)
     if args.command == "poses":
         from . import poses
 
