@@ -31,6 +31,8 @@ const HANDS: [&str; 2] = ["hands.json", "fingertips.csv"];
 enum Stream {
     /// Camera poses.
     Poses,
+    /// Depth.
+    Depth,
     /// Hands.
     Hands,
 }
@@ -40,6 +42,7 @@ impl Stream {
     fn name(self) -> &'static str {
         match self {
             Self::Poses => "poses",
+            Self::Depth => "depth",
             Self::Hands => "hands",
         }
     }
@@ -69,6 +72,9 @@ pub struct PerceiveArgs {
     /// A folder with the networks' weights, in place of those that come with the packages
     #[arg(long, value_name = "DIR")]
     weights: Option<PathBuf>,
+    /// Make depth by a metric model of the `transformers` library: its folder, as its authors publish it
+    #[arg(long, value_name = "DIR")]
+    depth_model: Option<PathBuf>,
     /// Where what was computed is kept, so that a run that was stopped goes on there; safe to delete [default: OUT.cache]
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
@@ -92,15 +98,29 @@ pub struct PerceiveArgs {
 struct Posed {
     images: PathBuf,
     model: PathBuf,
-    made: Made,
+    made: PosesMade,
 }
 
 #[derive(Deserialize)]
-struct Made {
+struct PosesMade {
     adapter: String,
     licence: String,
     images: usize,
     models: Vec<usize>,
+}
+
+/// What the package writes of depth.
+#[derive(Deserialize)]
+struct Measured {
+    depth: PathBuf,
+    made: DepthMade,
+}
+
+#[derive(Deserialize)]
+struct DepthMade {
+    adapter: String,
+    kind: String,
+    licence: String,
 }
 
 /// What the sources hold.
@@ -151,6 +171,9 @@ pub fn run(args: &PerceiveArgs) -> anyhow::Result<Answer> {
     if let Some(weights) = args.weights.as_ref().filter(|w| !w.is_dir()) {
         bail!("{}: --weights wants a folder with the networks' files", shown(weights));
     }
+    if let Some(model) = args.depth_model.as_ref().filter(|m| !m.join("config.json").is_file()) {
+        bail!("{}: --depth-model wants a folder with config.json and model.safetensors in it", shown(model));
+    }
     match args.sources.as_slice() {
         [one] if is_recording(one) => recording(args, one),
         many => {
@@ -171,8 +194,12 @@ fn recording(args: &PerceiveArgs, source: &Path) -> anyhow::Result<Answer> {
         return planned(args, &[source.as_os_str()]);
     }
     let Some(out) = &args.out else { bail!("--out DIR is needed") };
-    if args.redo.contains(&Stream::Poses) {
-        bail!("--redo poses: poses are made of a video or a folder of images; {} is a recording", shown(source));
+    if args.depth_model.is_some() || args.redo.iter().any(|&stream| stream != Stream::Hands) {
+        bail!(
+            "{}: is a recording, of which hands alone are made; --redo poses, --redo depth and --depth-model are for the \
+             sources it was made of",
+            shown(source)
+        );
     }
     let has_hands = HANDS.iter().any(|name| source.join(name).is_file());
     let wanted = !has_hands || args.redo.contains(&Stream::Hands);
@@ -227,17 +254,23 @@ fn sources(args: &PerceiveArgs, options: &Options) -> anyhow::Result<Answer> {
     // Told before hours of work, not after them. Hands that are there may yet meet no frame.
     let python = Python::find(args.python.as_deref());
     let redo_hands = args.redo.contains(&Stream::Hands);
-    let python = if facts.poses && facts.hands && !redo_hands { python.ok() } else { Some(python?) };
+    let wants_depth = !facts.depth && args.depth_model.is_some();
+    let python = if facts.poses && facts.hands && !redo_hands && !wants_depth { python.ok() } else { Some(python?) };
     let inputs: Vec<PathBuf> = sources.iter().map(|(_, path)| path.clone()).collect();
     let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
     let output = Output::new(out, Kind::Recording, &inputs)?;
     let mut notes = Vec::new();
-    if !facts.poses {
-        let Some(python) = &python else { bail!("poses need Python") };
-        notes.push(posed(args, python, out, &mut sources, options)?);
-        captures = read(&sources, options)?;
-    } else if args.redo.contains(&Stream::Poses) {
+    if facts.poses && args.redo.contains(&Stream::Poses) {
         bail!("--redo poses: the sources have poses of their own, which are taken");
+    }
+    if let Some(python) = python.as_ref().filter(|_| !facts.poses || wants_depth) {
+        if !facts.poses {
+            notes.push(posed(args, python, out, &mut sources, options)?);
+        }
+        if let Some(model) = args.depth_model.as_ref().filter(|_| wants_depth) {
+            notes.push(measured(args, python, out, &mut sources, model)?);
+        }
+        captures = read(&sources, options)?;
     }
     if redo_hands {
         captures.iter_mut().for_each(|c| c.hands = None);
@@ -297,6 +330,9 @@ fn posed(
     python.run(command, Stream::Poses.name(), &cache)?;
     let posed: Posed = crate::json::read(&answer)?;
     let Some(colmap) = crate::import::formats::named("colmap") else { bail!("no reader for COLMAP") };
+    if posed.images != source {
+        eprintln!("poses: other networks may run on the same images: {}", shown(&posed.images));
+    }
     sources.insert(0, (format, posed.images));
     sources.insert(0, (colmap, posed.model));
     let made = posed.made;
@@ -309,6 +345,30 @@ fn posed(
         made.images,
         if pieces == 1 { "" } else { "s" }
     ))
+}
+
+/// Makes depth of the folder of images, and puts it behind the sources. Returns what is to be noted.
+fn measured(
+    args: &PerceiveArgs,
+    python: &Python,
+    out: &Path,
+    sources: &mut Vec<(&'static Format, PathBuf)>,
+    model: &Path,
+) -> anyhow::Result<String> {
+    let Some((_, images)) = sources.iter().find(|(format, path)| format.name == "frames" && path.is_dir()) else {
+        bail!("--depth-model: depth is made of a folder of images, or of a video without poses: no source is one");
+    };
+    let cache = cache(args, out)?;
+    let answer = cache.join("depth.json");
+    let mut command = python.command(Some(Stream::Depth.name()));
+    command.arg("depth").arg(images).arg("--out").arg(&answer).arg("--cache").arg(&cache);
+    command.arg("--depth-model").arg(model).args(common(args));
+    python.run(command, Stream::Depth.name(), &cache)?;
+    let measured: Measured = crate::json::read(&answer)?;
+    let Some(moge) = crate::import::formats::named("moge") else { bail!("no reader for depth") };
+    sources.push((moge, measured.depth));
+    let made = measured.made;
+    Ok(format!("depth was made by {}, {} ({})", made.adapter, made.kind, made.licence))
 }
 
 /// Makes the hands of the staged recording; whether there are any.
@@ -354,6 +414,9 @@ fn planned(args: &PerceiveArgs, what: &[&OsStr]) -> anyhow::Result<Answer> {
     let python = Python::plain(args.python.as_deref())?;
     let mut command = python.command(None);
     command.arg("plan").args(what).args(common(args));
+    if let Some(model) = &args.depth_model {
+        command.arg("--depth-model").arg(model);
+    }
     let text = package::said(command)?;
     print(&text)?;
     Ok(Answer::Yes)

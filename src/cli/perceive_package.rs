@@ -15,7 +15,7 @@ macro_rules! files {
     };
 }
 
-const FILES: [(&str, &str); 14] = files![
+const FILES: [(&str, &str); 17] = files![
     "pyproject.toml",
     "uv.lock",
     "src/paws_perceive/__init__.py",
@@ -23,7 +23,10 @@ const FILES: [(&str, &str); 14] = files![
     "src/paws_perceive/adapters/__init__.py",
     "src/paws_perceive/adapters/mediapipe_hands.py",
     "src/paws_perceive/adapters/pycolmap_poses.py",
+    "src/paws_perceive/adapters/transformers_depth.py",
     "src/paws_perceive/cache.py",
+    "src/paws_perceive/depth.py",
+    "src/paws_perceive/exr.py",
     "src/paws_perceive/geometry.py",
     "src/paws_perceive/hands.py",
     "src/paws_perceive/plan.py",

@@ -107,7 +107,8 @@ fn sources_that_cannot_be_perceived_are_told() {
         ("rec said.srt --out out", "is a recording already"),
         ("nowhere --out out", "nowhere: no such file"),
         ("rec --out out --weights nowhere", "--weights wants a folder"),
-        ("rec --out out --redo poses", "--redo poses"),
+        ("rec --out out --redo poses", "of which hands alone are made"),
+        ("rec --out out --depth-model nowhere", "--depth-model wants a folder"),
     ] {
         let args: Vec<&str> = line.split(' ').collect();
         let out = words(&args, home.path(), None);

@@ -1,4 +1,4 @@
-"""`python -m paws_perceive plan|poses|hands`: one stream at a time, for `paws perceive` and for people."""
+"""`python -m paws_perceive plan|poses|depth|hands`: one stream at a time, for `paws perceive` and for people."""
 
 import argparse
 import errno
@@ -32,16 +32,19 @@ def parser():
     top = argparse.ArgumentParser(prog="paws_perceive", description=__doc__)
     top.add_argument("--version", action="version", version=__version__)
     commands = top.add_subparsers(dest="command", required=True)
-    of = {name: commands.add_parser(name) for name in ("plan", "poses", "hands")}
+    of = {name: commands.add_parser(name) for name in ("plan", "poses", "depth", "hands")}
     for one in of.values():
         one.add_argument("source", nargs="?" if one is of["plan"] else None)
         one.add_argument("--device", choices=("cpu", "gpu"), default="cpu")
         one.add_argument("--redo", action="append", default=[], metavar="STREAM")
     of["plan"].add_argument("--facts", help="what the source holds, as JSON")
-    for name in ("poses", "hands"):
+    for name in ("plan", "depth"):
+        of[name].add_argument("--depth-model", metavar="DIR", required=name == "depth")
+    for name in ("poses", "depth", "hands"):
         of[name].add_argument("--cache", required=True, metavar="DIR")
     of["hands"].add_argument("--weights", metavar="DIR")
-    of["poses"].add_argument("--out", required=True, metavar="FILE")
+    for name in ("poses", "depth"):
+        of[name].add_argument("--out", required=True, metavar="FILE")
     of["poses"].add_argument("--fps", type=float, default=10)
     of["poses"].add_argument("--ffmpeg", default="ffmpeg")
     return top
@@ -53,7 +56,7 @@ def act(args):
         if args.facts is None and args.source is None:
             raise Failure("plan: name a source")
         facts = json.loads(args.facts) if args.facts is not None else plan.facts_of(args.source)
-        sys.stdout.write(plan.text(facts, args.device, args.redo))
+        sys.stdout.write(plan.text(facts, args.device, args.redo, args.depth_model))
         return DONE
     redo = args.command in args.redo
     adapters.package("numpy", adapters.of(args.command).ABOUT)
@@ -61,6 +64,11 @@ def act(args):
         from . import poses
 
         found = poses.run(args.source, args.out, args.cache, args.device, redo, args.fps, say, args.ffmpeg)
+        return DONE if found else NOTHING
+    if args.command == "depth":
+        from . import depth
+
+        found = depth.run(args.source, args.out, args.cache, args.depth_model, args.device, redo, say, progress)
         return DONE if found else NOTHING
     from . import hands
 

@@ -10,7 +10,7 @@ VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".avi", ".webm")
 # What nothing here makes, and what does.
 ELSEWHERE = {
     "depth": "a metric depth network on the same images, then its folder as one more source: `moge infer -i IMAGES -o DEPTH --maps`, "
-    "moge=DEPTH (MoGe-2: MIT, wants a GPU)",
+    "moge=DEPTH (MoGe-2: MIT, wants a GPU); or a metric model's folder: --depth-model DIR",
     "clips": "subtitles of what was said, or a table start,end,narration, as one more source",
 }
 
@@ -41,14 +41,14 @@ def facts_of(folder):
     return {"images": count, "frames": count, "poses": False, "depth": False, "hands": False, "clips": False}
 
 
-def plan(facts, device="cpu", redo=()):
+def plan(facts, device="cpu", redo=(), depth_model=None):
     """Rows for people: the stream, what is done about it, on what, how long, how much memory, under which licence."""
     rows = []
     for stream in ("poses", "depth", "hands", "clips"):
         there = facts.get(stream) and stream not in redo
         if there:
             rows.append((stream, "is there", "", "", "", ""))
-        elif stream in ELSEWHERE:
+        elif stream in ELSEWHERE and not (stream == "depth" and depth_model):
             rows.append((stream, "missing", "", "", "", ""))
         elif facts.get("images") == 0:
             rows.append((stream, "needs images", "", "", "", ""))
@@ -68,10 +68,10 @@ def duration(secs):
     return f"{secs / 60:.0f} min" if secs < 5400 else f"{secs / 3600:.1f} h"
 
 
-def text(facts, device="cpu", redo=()):
+def text(facts, device="cpu", redo=(), depth_model=None):
     """The plan as a table and the sentences below it."""
     head = ("stream", "by", "on", "time, one core", "memory", "licence")
-    rows = [head, *plan(facts, device, redo)]
+    rows = [head, *plan(facts, device, redo, depth_model)]
     widths = [max(len(r[i]) for r in rows) for i in range(len(head))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in rows]
     used = [adapters.of(r[0]).ABOUT for r in rows[1:] if r[5]]
@@ -81,12 +81,12 @@ def text(facts, device="cpu", redo=()):
             lines.append(f"{about.stream}: weights: {about.weights_from}")
     if used:
         lines.append(f"packages, fetched on the first run where uv is there: {', '.join(a.package for a in used)}")
-    if device == "gpu" and used:
+    if device == "gpu" and used and not any("gpu" in a.devices for a in used):
         lines.append("nothing of this uses a GPU: it runs on the CPU")
     for stream, how in ELSEWHERE.items():
-        if not facts.get(stream):
+        if not facts.get(stream) and not (stream == "depth" and depth_model):
             lines.append(f"{stream}: missing, and not made here: {how}")
-    if not facts.get("depth") and any(a.stream == "hands" for a in used):
+    if not facts.get("depth") and not depth_model and any(a.stream == "hands" for a in used):
         lines.append("hands: without depth their distance comes from an adult's size, to about a tenth")
     lines.append("nothing was run")
     return os.linesep.join(lines) + os.linesep

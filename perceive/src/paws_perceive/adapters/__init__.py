@@ -8,7 +8,7 @@ import pathlib
 from .. import Failure
 
 # Files of `adapters/`, in the order of the streams.
-ALL = ("pycolmap_poses", "mediapipe_hands")
+ALL = ("pycolmap_poses", "transformers_depth", "mediapipe_hands")
 
 
 @dataclasses.dataclass(frozen=True)
