@@ -114,6 +114,13 @@ def test_the_real_classes_run_with_a_tiny_random_model(tmp_path, kind):
     if not torch.cuda.is_available():
         with pytest.raises(Failure, match="no GPU.*leave out --gpu"):
             module.load("gpu", folder)
+    from safetensors.torch import load_file, save_file
+
+    weights = load_file(folder / "model.safetensors")
+    weights.pop(sorted(weights)[0])
+    save_file(weights, folder / "model.safetensors", metadata={"format": "pt"})
+    with pytest.raises(Failure, match="1 of the model's weights are not in its file"):
+        module.load("cpu", folder)
     (folder / "model.safetensors").write_bytes(b"broken")
     with pytest.raises(Failure, match="cannot be loaded"):
         module.load("cpu", folder)

@@ -74,8 +74,12 @@ def load(device="cpu", weights=None):
         raise Failure("depth: no GPU that PyTorch can use is here: leave out --gpu (slow), or install PyTorch for your GPU")
     on = "cuda" if device == "gpu" else "cpu"
     try:
-        model = transformers.AutoModelForDepthEstimation.from_pretrained(weights, local_files_only=True).to(on).eval()
+        model, told = transformers.AutoModelForDepthEstimation.from_pretrained(weights, local_files_only=True, output_loading_info=True)
         processor = transformers.AutoImageProcessor.from_pretrained(weights, local_files_only=True)
-    except (OSError, ValueError) as error:
-        raise Failure(f"{weights}: cannot be loaded ({str(error).splitlines()[0]})") from error
+    except Exception as error:  # Each of the libraries below has an error of its own.
+        raise Failure(f"{weights}: cannot be loaded ({(str(error).splitlines() or [repr(error)])[0]}): download the model again") from error
+    # What a file lacks would be random numbers.
+    if told["missing_keys"]:
+        raise Failure(f"{weights}: {len(told['missing_keys'])} of the model's weights are not in its file: it is of another version")
+    model = model.to(on).eval()
     return Network(torch, model, processor, on)
