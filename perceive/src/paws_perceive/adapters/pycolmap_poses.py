@@ -20,8 +20,8 @@ ABOUT = About(
     needs="colour images in order, with texture and without much blur",
     gives="world-to-camera poses, OpenCV axes, arbitrary unit; one camera; points; one model a piece of the walk that hangs together",
     devices=("cpu",),
-    # 61 frames of 960x540 took 32 s on one core.
-    secs_per_frame=0.6,
+    # 60 frames of 640x480 took 56 s on one core.
+    secs_per_frame=1.0,
     memory_mb=1500,
     version=1,
 )
