@@ -19,6 +19,8 @@ use crate::report::table::aligned;
 
 /// Frames that are decoded at a time: enough for all cores, few enough for the memory.
 const AT_ONCE: usize = 16;
+/// Image width where the user says none, pixels: twice the width that the pipeline was measured at.
+const WIDTH: u32 = 640;
 /// Items that could not be read that are listed before "and n more".
 const MAX_LISTED: usize = 5;
 
@@ -53,7 +55,7 @@ pub struct ImportArgs {
 
 /// Which frames, and how they look.
 #[derive(Debug, Args)]
-struct FrameArgs {
+pub struct FrameArgs {
     /// Frames a second that are kept; 0 keeps all
     #[arg(long, value_name = "HZ", default_value_t = 10.0)]
     fps: f64,
@@ -66,9 +68,9 @@ struct FrameArgs {
     /// Largest distance in time of two poses that are interpolated
     #[arg(long, value_name = "SECS", default_value_t = 0.2)]
     pose_gap: f64,
-    /// Image width of the recording at the most; images are never enlarged
-    #[arg(long, value_name = "PIXELS", default_value_t = 640, value_parser = clap::value_parser!(u32).range(64..=4096))]
-    width: u32,
+    /// Image width of the recording at the most; images are never enlarged [default: 640; of `paws perceive` 960]
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(64..=4096))]
+    width: Option<u32>,
     /// Field of view of the recording at the most, along the width [default: 100 for fisheyes]
     #[arg(long, value_name = "DEGREES")]
     fov: Option<f64>,
@@ -89,7 +91,7 @@ struct FrameArgs {
 
 /// What is said over a source's own declarations.
 #[derive(Debug, Args)]
-struct ConventionArgs {
+pub struct ConventionArgs {
     /// Up in the axes of the source with the poses: x, y, z, -x, -y or -z
     #[arg(long, value_name = "AXIS", allow_hyphen_values = true, value_parser = axes::axis)]
     up: Option<Vector>,
@@ -141,48 +143,46 @@ fn topic(text: &str) -> Result<(String, String), String> {
     }
 }
 
-impl ImportArgs {
-    fn options(&self) -> anyhow::Result<Options> {
-        let (f, c) = (&self.frames, &self.convention);
-        for (name, value) in [
-            ("--source-fps", f.source_fps),
-            ("--fov", f.fov),
-            ("--unit", c.unit),
-            ("--scale", c.scale),
-            ("--max-gap", f.max_gap),
-            ("--pose-gap", Some(f.pose_gap)),
-        ] {
-            if let Some(value) = value.filter(|v| !v.is_finite() || *v <= 0.0) {
-                bail!("{name} {value}: give a number above 0");
-            }
+/// The options that the arguments say. `width`: the images', pixels, where they do not say it.
+pub fn options(f: &FrameArgs, c: &ConventionArgs, width: u32) -> anyhow::Result<Options> {
+    for (name, value) in [
+        ("--source-fps", f.source_fps),
+        ("--fov", f.fov),
+        ("--unit", c.unit),
+        ("--scale", c.scale),
+        ("--max-gap", f.max_gap),
+        ("--pose-gap", Some(f.pose_gap)),
+    ] {
+        if let Some(value) = value.filter(|v| !v.is_finite() || *v <= 0.0) {
+            bail!("{name} {value}: give a number above 0");
         }
-        if !f.fps.is_finite() || f.fps < 0.0 || !c.hand_lag.is_finite() {
-            bail!("--fps {} and --hand-lag {}: give finite numbers, --fps from 0 on", f.fps, c.hand_lag);
-        }
-        Ok(Options {
-            fps: f.fps,
-            source_fps: f.source_fps,
-            max_gap_secs: f.max_gap,
-            pose_gap_secs: f.pose_gap,
-            width: f.width as usize,
-            fov_deg: f.fov,
-            rotate_quarters: f.rotate,
-            camera: f.camera,
-            up: c.up,
-            unit_m: c.unit,
-            poses: c.poses,
-            camera_axes: c.camera_axes,
-            quaternion: c.quaternion,
-            scale: c.scale,
-            hand_lag_secs: c.hand_lag,
-            topics: f.topic.iter().cloned().collect(),
-            ffmpeg: f.ffmpeg.clone(),
-        })
     }
+    if !f.fps.is_finite() || f.fps < 0.0 || !c.hand_lag.is_finite() {
+        bail!("--fps {} and --hand-lag {}: give finite numbers, --fps from 0 on", f.fps, c.hand_lag);
+    }
+    Ok(Options {
+        fps: f.fps,
+        source_fps: f.source_fps,
+        max_gap_secs: f.max_gap,
+        pose_gap_secs: f.pose_gap,
+        width: f.width.unwrap_or(width) as usize,
+        fov_deg: f.fov,
+        rotate_quarters: f.rotate,
+        camera: f.camera,
+        up: c.up,
+        unit_m: c.unit,
+        poses: c.poses,
+        camera_axes: c.camera_axes,
+        quaternion: c.quaternion,
+        scale: c.scale,
+        hand_lag_secs: c.hand_lag,
+        topics: f.topic.iter().cloned().collect(),
+        ffmpeg: f.ffmpeg.clone(),
+    })
 }
 
 /// The sources with their formats. A first word that names a format and no file is the format of all that name none.
-fn resolve(sources: &[PathBuf]) -> anyhow::Result<Vec<(&'static Format, PathBuf)>> {
+pub fn resolve(sources: &[PathBuf]) -> anyhow::Result<Vec<(&'static Format, PathBuf)>> {
     let (forced, rest) = match sources {
         [first, rest @ ..] if !first.exists() => match first.to_str().and_then(formats::named) {
             Some(format) => (Some(format), rest),
@@ -217,7 +217,7 @@ pub fn run(args: &ImportArgs) -> anyhow::Result<Answer> {
         return super::door::check(&args.sources);
     }
     let Some(out) = &args.out else { bail!("--out DIR is needed") };
-    let options = args.options()?;
+    let options = options(&args.frames, &args.convention, WIDTH)?;
     let sources = resolve(&args.sources)?;
     let inputs: Vec<&Path> = sources.iter().map(|(_, path)| path.as_path()).collect();
     let output = Output::new(out, Kind::Recording, &inputs)?;
@@ -257,7 +257,7 @@ fn fixed(captures: &[Capture], mut options: Options) -> anyhow::Result<Imported>
 }
 
 /// Writes images, then the tables that name them.
-fn write(imported: &mut Imported, output: &Output, steps: &Steps) -> anyhow::Result<()> {
+pub fn write(imported: &mut Imported, output: &Output, steps: &Steps) -> anyhow::Result<()> {
     let pictures = imported.video_pictures();
     if pictures > 0 {
         steps.report("decoding video", 0, pictures);
@@ -301,7 +301,7 @@ fn list() -> String {
 }
 
 /// What came out, for the terminal.
-fn told(imported: &Imported, out: &Path) -> String {
+pub fn told(imported: &Imported, out: &Path) -> String {
     let report = &imported.report;
     let mut rows = vec![["stream", "count", "of", "source", "joined by"].map(str::to_owned).to_vec()];
     rows.extend(

@@ -19,6 +19,8 @@ mod look;
 mod measure;
 mod moved;
 mod output;
+mod perceive;
+mod perceive_package;
 mod progress;
 mod synth;
 mod twin;
@@ -62,6 +64,8 @@ enum Command {
     Demo(demo::DemoArgs),
     /// Make a recording of what a device, a data set or a network wrote
     Import(Box<import::ImportArgs>),
+    /// Make a recording of a video or a phone's scan: the streams that it lacks by open networks
+    Perceive(Box<perceive::PerceiveArgs>),
     /// Make a simulated, validated twin from a recording
     Twin(twin::TwinArgs),
     /// Infer joints from recordings, or from a bare trajectory
@@ -137,6 +141,7 @@ pub fn run() -> ExitCode {
     let result = match cli.command {
         Command::Demo(args) => demo::run(&args),
         Command::Import(args) => import::run(&args),
+        Command::Perceive(args) => perceive::run(&args),
         Command::Twin(args) => twin::run(&args),
         Command::Infer(args) => infer::run(&args),
         Command::Export(args) => export::run(&args),

@@ -24,6 +24,7 @@ mod known_truth;
 mod looks;
 mod mjcf;
 mod models;
+mod perceive;
 mod physics;
 mod real_recordings;
 mod robust;
