@@ -9,6 +9,7 @@ macro_rules! eprintln {
 }
 
 mod ablate;
+mod batch;
 mod calls;
 mod check;
 mod config;
@@ -81,6 +82,8 @@ enum Command {
     Import(Box<import::ImportArgs>),
     /// Make a simulated, validated twin from a recording
     Twin(twin::TwinArgs),
+    /// Make the twins of many recordings; a run that was killed goes on where it was
+    Batch(batch::BatchArgs),
     /// Infer joints from recordings, or from a bare trajectory
     Infer(infer::InferArgs),
     /// Write a twin, or joints that another program found, as URDF, MJCF, glTF and USD
@@ -191,6 +194,7 @@ fn answer_of(cli: Cli) -> anyhow::Result<Answer> {
         Command::Demo(args) => demo::run(&args),
         Command::Import(args) => import::run(&args),
         Command::Twin(args) => twin::run(&args),
+        Command::Batch(args) => batch::run(&args),
         Command::Infer(args) => infer::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Check(args) => check::run(&args),

@@ -6,6 +6,7 @@ mod accuracy;
 mod articulations;
 mod bad_input;
 mod bare_trajectories;
+mod batch;
 mod common;
 mod conventions;
 mod floors;

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import csv
+import os
 import sys
 import sysconfig
-import os
 from pathlib import Path
 
 from ._call import PawsError, Progress, call
@@ -13,6 +13,14 @@ from .twins import needed
 
 #: The tables of a batch's folder.
 TABLES = ("results", "joints", "predictions", "timings")
+
+WORD, COUNT, NUMBER = "word", "count", "number"
+#: Columns that are no numbers with a fraction.
+COLUMNS = {
+    **dict.fromkeys(("name", "recording", "status", "version", "reason"), WORD),
+    **dict.fromkeys(("joint", "furniture", "type", "verdict", "clip"), WORD),
+    **dict.fromkeys(("code", "clips", "answered", "joints", "pass", "fail", "undetermined"), COUNT),
+}
 
 
 def run(manifest, out, *, progress: Progress | None = None, **options) -> dict[str, list[dict[str, str]]]:
@@ -41,9 +49,12 @@ def to_parquet(out) -> list[Path]:
         file = Path(out) / f"{name}.csv"
         if not file.is_file():
             raise PawsError(f"{file}: no such file or folder; `paws batch MANIFEST --out {out}` writes it")
-        # Names are words even where they look like numbers.
-        words = {column: pyarrow.string() for column in ("name", "recording", "clip", "joint", "reason", "version")}
-        options = table.ConvertOptions(column_types=words, strings_can_be_null=True, quoted_strings_can_be_null=False)
+        with open(file, encoding="utf-8") as opened:
+            columns = opened.readline().strip().split(",")
+        # Said, not guessed: the same types whatever the rows are.
+        kinds = {WORD: pyarrow.string(), COUNT: pyarrow.int64(), NUMBER: pyarrow.float64()}
+        types = {column: kinds[COLUMNS.get(column, NUMBER)] for column in columns}
+        options = table.ConvertOptions(column_types=types, strings_can_be_null=True, quoted_strings_can_be_null=False)
         rows = table.read_csv(file, convert_options=options, parse_options=table.ParseOptions(newlines_in_values=True))
         target = file.with_suffix(".parquet")
         part = target.with_suffix(".parquet.partial")
