@@ -88,9 +88,9 @@ pub fn result(entry: &Entry, given: &str, made: Option<&Made>) -> Vec<String> {
         given.to_owned(),
         entry.status.word().to_owned(),
         entry.code.map_or_else(String::new, |code| code.to_string()),
-        count(&|m| m.predictions.predictions.len()),
-        count(&|m| m.predictions.predictions.iter().filter(|p| p.kind.is_some()).count()),
-        count(&|m| m.twin.furniture.len()),
+        count(&|m: &Made| m.predictions.predictions.len()),
+        count(&|m: &Made| m.predictions.predictions.iter().filter(|p| p.kind.is_some()).count()),
+        count(&|m: &Made| m.twin.furniture.len()),
         verdicts(Verdict::Pass),
         verdicts(Verdict::Fail),
         verdicts(Verdict::Undetermined),
@@ -107,7 +107,10 @@ pub fn complaint(status: Status, said: &str, made: &Made) -> String {
     match (status, said) {
         (Status::No, "") if joints.is_empty() => "no joint was found".to_owned(),
         (Status::No, "") if refuted > 0 => format!("{refuted} of {} joints are refuted", joints.len()),
-        (Status::No, "") => made.twin.left_out.iter().map(|l| format!("{}: not built: {}; ", l.id, l.reason)).collect(),
+        (Status::No, "") => match made.twin.left_out.first() {
+            Some(left) => format!("{}: not built: {}", left.id, left.reason),
+            None => "a part of it could not be done; its log says which".to_owned(),
+        },
         (_, said) => said.to_owned(),
     }
 }

@@ -99,7 +99,7 @@ pub fn run(args: &BatchArgs) -> anyhow::Result<Answer> {
         None => rows.iter().collect(),
         Some((i, n)) => rows.iter().skip(i - 1).step_by(n).collect(),
     };
-    let (tasks, refused, kept) = sorted_out(args, &rows, &mine, &entries)?;
+    let (tasks, refused, kept) = sorted_out(args, &rows, &mine, &entries);
     if kept > 0 {
         eprintln!("{kept} of {} recordings are finished already", mine.len());
     }
@@ -205,7 +205,7 @@ fn sorted_out<'a>(
     rows: &[Row],
     mine: &[&'a Row],
     entries: &BTreeMap<String, Entry>,
-) -> anyhow::Result<(Vec<Task<'a>>, Vec<Entry>, usize)> {
+) -> (Vec<Task<'a>>, Vec<Entry>, usize) {
     let out = args.out.canonicalize().ok();
     // Whether recordings are nested or given twice is a matter of the whole manifest.
     let unfit: BTreeMap<usize, String> = rows
@@ -238,7 +238,7 @@ fn sorted_out<'a>(
             tasks.push(Task { row, key, config });
         }
     }
-    Ok((tasks, refused, kept))
+    (tasks, refused, kept)
 }
 
 /// Whether an entry is the answer for a key, and its twin is there.

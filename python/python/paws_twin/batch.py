@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import csv
-import os
-import sys
-import sysconfig
 from pathlib import Path
 
+from .__main__ import say_program
 from ._call import PawsError, Progress, call
 from .twins import needed
 
@@ -27,7 +25,7 @@ def run(manifest, out, *, progress: Progress | None = None, **options) -> dict[s
     """Makes the twins of a manifest (docs/batch.md) in `out` and answers with its tables, a list of rows each. What is
     finished already is not repeated. Options as of `paws batch`: `jobs`, `retry`, `config`.
     """
-    _say_program()
+    say_program()
     call("batch", manifest, progress=progress, out=Path(out), **options)
     return tables(out)
 
@@ -70,13 +68,3 @@ def _rows(file: Path) -> list[dict[str, str]]:
             return list(csv.DictReader(opened))
     except FileNotFoundError:
         raise PawsError(f"{file}: no such file or folder; a run that was killed writes it when it is run again") from None
-
-
-def _say_program() -> None:
-    """Children of a batch run the `paws` command of this environment: the program of this process is Python."""
-    name = "paws.exe" if sys.platform == "win32" else "paws"
-    for folder in (sysconfig.get_path("scripts"), Path(sys.executable).parent):
-        program = Path(folder) / name
-        if program.is_file():
-            os.environ.setdefault("PAWS_PROGRAM", str(program))
-            return
