@@ -404,7 +404,7 @@ fn judged(ended: ExitStatus, said: &str, twin: &Path) -> (Status, Option<i32>, S
     if status == Status::Failed {
         let error = format!("\n{said}").rsplit_once("\nerror: ").map(|(_, error)| error.trim().to_owned());
         let why = match ended.code() {
-            Some(_) => error.unwrap_or_else(|| last_line(said)),
+            Some(_) => error.unwrap_or_else(|| last_words(said)),
             None => format!("{ended}; was the memory short? fewer --jobs take less"),
         };
         return (status, ended.code(), why.chars().take(MAX_REASON).collect());
@@ -415,8 +415,14 @@ fn judged(ended: ExitStatus, said: &str, twin: &Path) -> (Status, Option<i32>, S
     }
 }
 
-fn last_line(said: &str) -> String {
-    said.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("it said nothing").trim().to_owned()
+/// What a process said when it came to a bad end: where it panicked, else its last line.
+fn last_words(said: &str) -> String {
+    let lines: Vec<&str> = said.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    match lines.iter().position(|line| line.contains("panicked at")) {
+        // The place, and on the next line the reason.
+        Some(at) => lines.iter().skip(at).take(2).copied().collect::<Vec<&str>>().join(" "),
+        None => lines.last().copied().unwrap_or("it said nothing").to_owned(),
+    }
 }
 
 fn read_made(twin: &Path) -> anyhow::Result<Made> {
@@ -472,6 +478,13 @@ mod tests {
         for wrong in ["0/8", "9/8", "2", "a/b", "1/0"] {
             assert!(shard(wrong).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn a_panic_is_told_by_its_place_and_reason() {
+        let said = "a note\n\nthread 'main' panicked at src/a.rs:1:2:\nindex out of bounds\nnote: run with more\n";
+        assert_eq!(last_words(said), "thread 'main' panicked at src/a.rs:1:2: index out of bounds");
+        assert_eq!((last_words("one\ntwo\n\n"), last_words("")), ("two".to_owned(), "it said nothing".to_owned()));
     }
 
     #[test]
