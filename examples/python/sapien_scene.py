@@ -1,4 +1,4 @@
-"""The twin in SAPIEN, and so in ManiSkill: python sapien_scene.py TWIN (pip install sapien)"""
+"""The twin in SAPIEN, and so in ManiSkill: python sapien_scene.py TWIN (pip install sapien; needs Vulkan, to load colours, too)"""
 
 import sys
 
