@@ -66,4 +66,6 @@ pub mod feedback;
 
 pub mod report;
 
+pub mod batch;
+
 pub mod cli;

@@ -9,7 +9,6 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-use super::Local;
 use super::mesh::Mesh;
 
 /// Edge of the cubes, metres: some ten thousands of triangles each.

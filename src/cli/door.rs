@@ -24,6 +24,12 @@ pub struct Door {
 }
 
 impl Door {
+    /// The options as a command line has them.
+    pub fn flags(self) -> Vec<&'static str> {
+        let all = [(self.fix, "--fix"), (self.as_is, "--as-is")];
+        all.into_iter().filter(|(is_set, _)| *is_set).map(|(_, flag)| flag).collect()
+    }
+
     /// Opens a recording, says what is doubtful about it, and corrects it where that was asked for.
     pub fn open(self, opening: Opening, dir: &Path) -> anyhow::Result<Recording> {
         let (mut recording, refused) = match opening.open(dir) {

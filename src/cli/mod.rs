@@ -2,7 +2,15 @@
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command prints; the library does not")]
 
+/// Standard error, or what a calling program collects (`calls`). It hides std's macro from all commands, so that none of them
+/// prints past its caller.
+macro_rules! eprintln {
+    ($($part:tt)*) => { $crate::cli::calls::note(&format!($($part)*)) };
+}
+
 mod ablate;
+mod batch;
+mod calls;
 mod check;
 mod config;
 mod demo;
@@ -28,11 +36,13 @@ mod units;
 mod validate;
 mod words;
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 
+pub use self::calls::{Called, Listener, call};
 use crate::config::Config;
 use crate::recording::Recording;
 
@@ -43,6 +53,15 @@ pub enum Answer {
     Yes,
     /// It ran, but a joint failed or nothing was found.
     No,
+}
+
+impl Answer {
+    fn code(self) -> u8 {
+        match self {
+            Self::Yes => 0,
+            Self::No => 1,
+        }
+    }
 }
 
 #[derive(Debug, Parser)]
@@ -68,6 +87,8 @@ enum Command {
     Perceive(Box<perceive::PerceiveArgs>),
     /// Make a simulated, validated twin from a recording
     Twin(twin::TwinArgs),
+    /// Make the twins of many recordings; a run that was killed goes on where it was
+    Batch(batch::BatchArgs),
     /// Infer joints from recordings, or from a bare trajectory
     Infer(infer::InferArgs),
     /// Write a twin, or joints that another program found, as URDF, MJCF, glTF and USD
@@ -134,15 +155,46 @@ impl Opening {
     }
 }
 
-/// Runs the command line.
+/// Runs the command line of this process.
 #[must_use]
 pub fn run() -> ExitCode {
-    let cli = Cli::parse();
-    let result = match cli.command {
+    ExitCode::from(run_with(std::env::args_os()))
+}
+
+/// Runs a command line, the program's name first, and answers with the exit code. It prints, help and errors included.
+#[must_use]
+pub fn run_with(args: impl IntoIterator<Item = OsString>) -> u8 {
+    let cli = match Cli::try_parse_from(args) {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Where that cannot be printed there is nobody to tell.
+            let _ = error.print();
+            return if error.use_stderr() { 2 } else { 0 };
+        }
+    };
+    match answer_of(cli) {
+        Ok(answer) => answer.code(),
+        Err(error) => {
+            // A closed pipe (`paws config | head`) is the reader's choice.
+            if error
+                .chain()
+                .any(|e| e.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe))
+            {
+                return 0;
+            }
+            eprintln!("error: {error:#}");
+            2
+        }
+    }
+}
+
+fn answer_of(cli: Cli) -> anyhow::Result<Answer> {
+    match cli.command {
         Command::Demo(args) => demo::run(&args),
         Command::Import(args) => import::run(&args),
         Command::Perceive(args) => perceive::run(&args),
         Command::Twin(args) => twin::run(&args),
+        Command::Batch(args) => batch::run(&args),
         Command::Infer(args) => infer::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Check(args) => check::run(&args),
@@ -152,27 +204,15 @@ pub fn run() -> ExitCode {
         Command::Measure(args) => measure::run(&args),
         Command::Synth(args) => synth::run(&args),
         Command::Config(args) => config::run(&args),
-    };
-    match result {
-        Ok(Answer::Yes) => ExitCode::SUCCESS,
-        Ok(Answer::No) => ExitCode::from(1),
-        Err(error) => {
-            // A closed pipe (`paws config | head`) is the reader's choice.
-            if error
-                .chain()
-                .any(|e| e.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe))
-            {
-                return ExitCode::SUCCESS;
-            }
-            eprintln!("error: {error:#}");
-            ExitCode::from(2)
-        }
     }
 }
 
 /// Prints to standard output; a closed pipe is an error that [`run`] takes for success.
 fn print(text: &str) -> anyhow::Result<()> {
     use std::io::Write;
+    if calls::took(text) {
+        return Ok(());
+    }
     let mut out = std::io::stdout().lock();
     out.write_all(text.as_bytes())?;
     out.flush()?;

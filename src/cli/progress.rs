@@ -5,6 +5,8 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::calls;
+
 /// A bar per step and the time that each took.
 pub struct Steps {
     bar: ProgressBar,
@@ -14,9 +16,9 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// A bar that is hidden where standard error is no terminal.
+    /// A bar that is hidden where standard error is no terminal, or where a program called.
     pub fn new() -> Self {
-        let bar = ProgressBar::new(1);
+        let bar = if calls::is_called() { ProgressBar::hidden() } else { ProgressBar::new(1) };
         if let Ok(style) = ProgressStyle::with_template("{msg:>14} {wide_bar} {pos}/{len} {elapsed} {prefix}") {
             bar.set_style(style);
         }
@@ -39,6 +41,8 @@ impl Steps {
         }
         self.bar.set_length(total as u64);
         self.bar.set_position(done as u64);
+        // Last, with nothing locked: a caller may end the command here.
+        calls::report(step, done, total);
     }
 
     /// Something that changes while a step goes on, behind the bar.

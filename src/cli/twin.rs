@@ -47,6 +47,9 @@ pub struct TwinArgs {
     no_textures: bool,
     #[command(flatten)]
     words: WordsArgs,
+    /// End when standard input does: for programs that start this one, so that it does not outlive them
+    #[arg(long, hide = true)]
+    with_parent: bool,
 }
 
 /// The folder of a look's files, as pages name it.
@@ -75,7 +78,18 @@ const FILES: [FileNote; 17] = [
     FileNote { name: "steps/", what: "intermediate results, with --keep" },
 ];
 
+/// Ends this process when its standard input ends, which it does when the program at its other end is gone.
+fn end_with_parent() {
+    std::thread::spawn(|| {
+        let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
+        std::process::exit(2);
+    });
+}
+
 pub fn run(args: &TwinArgs) -> anyhow::Result<Answer> {
+    if args.with_parent {
+        end_with_parent();
+    }
     let (config, asked) = (args.config.read()?, args.words.open()?);
     if let Some(asked) = asked.as_ref().filter(|a| a.is_dry()) {
         return asked.count(&[args.opening.open(&args.recording)?], &config);

@@ -101,6 +101,11 @@ impl<R: BufRead> Lines<R> {
         Error::format(&self.path, format!("line {}", self.number), message)
     }
 
+    /// Number of the line that was read last, from 1.
+    pub fn last(&self) -> usize {
+        self.number
+    }
+
     /// A finite number in the line that was read last.
     ///
     /// # Errors
@@ -274,6 +279,12 @@ impl Row<'_> {
             *value = self.number(column)?;
         }
         Ok(out)
+    }
+
+    /// Number of the row's line in the file, from 1.
+    #[must_use]
+    pub fn line(&self) -> usize {
+        self.table.lines.number
     }
 
     /// An error at this row.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-const FLOORS: [&[&str]; 17] = [
+const FLOORS: [&[&str]; 18] = [
     &["error"],
     &["json", "math"],
     &["articulation", "vlm"],
@@ -20,6 +20,7 @@ const FLOORS: [&[&str]; 17] = [
     &["appearance", "export", "validation", "evaluation"],
     &["feedback"],
     &["report"],
+    &["batch"],
     &["cli"],
 ];
 

@@ -1,0 +1,45 @@
+//! The Python module: its wheel is built, installed into a fresh environment, and its tests and the scripts of
+//! `examples/python` run there.
+
+use std::path::Path;
+use std::process::Command;
+
+use crate::common::{required, skipped};
+
+/// Building the module compiles the library once more, which takes minutes: only where that is asked for.
+fn is_asked_for() -> bool {
+    required() || std::env::var_os("PAWS_PYTHON").is_some_and(|v| !v.is_empty())
+}
+
+#[test]
+fn the_wheel_installs_and_its_scripts_run() {
+    if !is_asked_for() {
+        skipped("the Python module is tested where PAWS_PYTHON, PAWS_REQUIRE_SIMULATORS or CI is set");
+        return;
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let home = Path::new(env!("CARGO_TARGET_TMPDIR")).join("python_module");
+    let mut run = Command::new("bash");
+    run.arg(root.join("python/run")).arg(&home);
+    // A folder of its own that stays: the next run builds what has changed.
+    run.env("CARGO_TARGET_DIR", home.join("target"));
+    // What cargo tells its tests is about another crate.
+    for (name, _) in std::env::vars_os() {
+        let name_text = name.to_string_lossy();
+        if name_text.starts_with("CARGO_PKG_") || name_text.starts_with("CARGO_MANIFEST_") {
+            run.env_remove(&name);
+        }
+    }
+    let out = match run.output() {
+        Ok(out) => out,
+        Err(error) if required() => panic!("bash: {error}"),
+        Err(error) => {
+            skipped(&format!("the Python module is built by bash: {error}"));
+            return;
+        }
+    };
+    let text = format!("{}{}", String::from_utf8_lossy(&out.stdout), String::from_utf8_lossy(&out.stderr));
+    let tail: Vec<&str> = text.lines().rev().take(40).collect();
+    let tail: Vec<&str> = tail.into_iter().rev().collect();
+    assert!(out.status.success(), "{}", tail.join("\n"));
+}
