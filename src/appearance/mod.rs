@@ -223,7 +223,6 @@ mod tests {
             frames,
             clips: Vec::new(),
             hands: Vec::new(),
-            contact_known: true,
             labels: Default::default(),
             reconstruction: Vec::new(),
             depth_factors: DepthFactors::default(),

@@ -431,6 +431,7 @@ impl Work {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::appearance::Local;
 
     /// A square of 1.5 m in the plane z = 0.3 x in steps of a centimetre.
     fn plane() -> Mesh {

@@ -239,18 +239,15 @@ pub fn make(
 
 /// What the twin looks like; `None` where there is nothing to see. An error costs the look, not the twin: everything else is
 /// written without it.
-// MERGE: the body becomes
-//     steps.report("textures", 0, 1);
-//     crate::appearance::look(recording, scene, twin, config).and_then(|look| worn(twin, look))
-// and the names lose their underscores.
 fn looked(
-    _recording: &Recording,
-    _scene: &Scene,
+    recording: &Recording,
+    scene: &Scene,
     twin: &Twin,
-    _config: &Config,
-    _steps: &Steps,
+    config: &Config,
+    steps: &Steps,
 ) -> crate::error::Result<Option<Look>> {
-    worn(twin, Look::default())
+    steps.report("textures", 0, 1);
+    worn(twin, crate::appearance::look(recording, scene, twin, &config.appearance)?)
 }
 
 /// A look that the exporters take, where there is anything in it.

@@ -371,7 +371,7 @@ fn capture(recording: &Recording, order: JointOrder) -> Capture {
         for (place, tip) in places.into_iter().zip(tips) {
             joints[place] = Some(tip);
         }
-        HandAt { at: At::time(secs(h.frame)), side: h.side, joints, contact: Some(h.contact), score: Some(0.9) }
+        HandAt { at: At::time(secs(h.frame)), side: h.side, joints, contact: h.contact, score: Some(0.9) }
     });
     let c = recording.camera;
     Capture {

@@ -272,7 +272,7 @@ fn usd_has_texture_coordinates_and_a_package_that_needs_no_unpacking() {
 
     let package = export::usd::write_package(&twin(), Some(&look())).unwrap();
     let mut zip = zip::ZipArchive::new(std::io::Cursor::new(&package)).unwrap();
-    let names: Vec<String> = (0..zip.len()).map(|i| zip.by_index(i).unwrap().name().to_owned()).collect();
+    let names: Vec<String> = (0..zip.len()).map(|i| zip.by_index(i).unwrap().name().unwrap().into_owned()).collect();
     assert_eq!(names, ["scene.usda", "look/atlas_0.jpg", "look/atlas_1.jpg"]);
     for i in 0..zip.len() {
         let mut file = zip.by_index(i).unwrap();
