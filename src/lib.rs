@@ -11,7 +11,8 @@
 //! ```
 //!
 //! [`pipeline::infer`] runs the paper and keeps every intermediate result; [`feedback::weighed`] asks physics about joints
-//! in doubt; [`fitting::fit`] builds the twin; [`validation::validate`] replays the recorded hands; [`export`] writes it.
+//! in doubt; [`fitting::fit`] builds the twin; [`validation::validate`] replays the recorded hands; [`primitives::of`] makes
+//! of each joint what a robot needs to open it; [`export`] writes it.
 //!
 //! | paper | here |
 //! |---|---|
@@ -61,6 +62,7 @@ pub mod export;
 pub mod validation;
 
 pub mod feedback;
+pub mod primitives;
 
 pub mod report;
 

@@ -8,13 +8,15 @@ use rayon::prelude::*;
 
 use super::joints::{JointArgs, is_joints};
 use super::output::{restore, write_file};
+use super::primitives::{hands_beside, rows_beside, seen};
+use super::twin::JointHands;
 use super::{Answer, print, shown};
 use crate::evaluation::Predictions;
 use crate::export::annotations::{self, Shown};
 use crate::import::ply::Cloud;
 use crate::import::{articulations, ply};
 use crate::validation::Validation;
-use crate::{export, json, twin::Twin};
+use crate::{export, json, primitives, twin::Twin};
 
 /// A file format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -29,6 +31,8 @@ pub enum Format {
     GltfPhysics,
     /// OpenUSD text with UsdPhysics, for Isaac
     Usd,
+    /// What a robot needs to open each joint: grasp, path, Dynamic Movement Primitive (primitives.json; docs/primitives.md)
+    Primitives,
     /// Arti4D's list of joints (arti4d.json)
     Arti4d,
     /// EgoArti's list of clips and their annotations (egoarti_list.json, egoarti.json)
@@ -44,12 +48,12 @@ pub struct ExportArgs {
     /// other programs (docs/joints-format.md)
     twin: PathBuf,
     /// Formats, separated by commas
-    #[arg(long, value_delimiter = ',', default_value = "urdf,mjcf,gltf,gltf-physics,usd")]
+    #[arg(long, value_delimiter = ',', default_value = "urdf,mjcf,gltf,gltf-physics,usd,primitives")]
     format: Vec<Format>,
     #[command(flatten)]
     joints: JointArgs,
-    /// Folder for scene.urdf, scene.xml, kitchen.xml, scene.glb, physics.glb, scene.usda; and for twin.json where joints
-    /// were given
+    /// Folder for scene.urdf, scene.xml, kitchen.xml, scene.glb, physics.glb, scene.usda, primitives.json; and for twin.json
+    /// where joints were given
     #[arg(long, value_name = "DIR", default_value = ".")]
     out: PathBuf,
 }
@@ -105,20 +109,29 @@ struct Beside {
     verdicts: Vec<(String, String)>,
     /// Clips with their joints.
     clips: Vec<Shown>,
+    /// Recorded hands of each joint.
+    hands: Vec<JointHands>,
+    /// How sure each joint is, by its clips.
+    rows: Predictions,
     /// The reconstruction.
     cloud: Option<Cloud>,
 }
 
 impl Beside {
-    /// What the asked formats need.
-    fn of(args: &ExportArgs, verdicts: Vec<(String, String)>) -> anyhow::Result<Self> {
+    /// What the asked formats need; `beside_twin` is the folder that a twin lies in.
+    fn of(args: &ExportArgs, verdicts: Vec<(String, String)>, beside_twin: Option<&Path>) -> anyhow::Result<Self> {
         let clips = if args.format.contains(&Format::Egoarti) { clips(&args.twin)? } else { Vec::new() };
         let cloud = match (&args.joints.points, args.format.contains(&Format::Usdnet)) {
             (_, false) => None,
             (Some(points), true) => Some(ply::read(points)?),
             (None, true) => bail!("usdnet: parts are points of a reconstruction: give it by --points FILE.ply"),
         };
-        Ok(Self { verdicts, clips, cloud })
+        // Joints found elsewhere have no recording, whatever else lies in their folder.
+        let (hands, rows) = match (beside_twin, args.format.contains(&Format::Primitives)) {
+            (Some(dir), true) => (hands_beside(dir)?, rows_beside(dir)?),
+            _ => (Vec::new(), Predictions { predictions: Vec::new() }),
+        };
+        Ok(Self { verdicts, clips, hands, rows, cloud })
     }
 }
 
@@ -149,6 +162,10 @@ fn written(format: Format, twin: &Twin, beside: &Beside) -> crate::error::Result
         Format::Gltf => vec![("scene.glb", export::gltf::write(twin, &beside.verdicts)?)],
         Format::GltfPhysics => vec![("physics.glb", export::gltf::write_physics(twin)?)],
         Format::Usd => vec![("scene.usda", export::usd::write(twin)?.into_bytes())],
+        Format::Primitives => {
+            let seen = seen(&beside.hands, &beside.verdicts, &beside.rows);
+            vec![("primitives.json", json::text(&primitives::of(twin, &seen))?.into_bytes())]
+        }
         Format::Arti4d => vec![("arti4d.json", annotations::arti4d(twin)?.into_bytes())],
         Format::Egoarti => {
             let [list, all] = annotations::egoarti(twin, &beside.clips)?;
@@ -196,7 +213,11 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<Answer> {
             (twin, Vec::new())
         }
     };
-    let beside = Beside::of(args, verdicts)?;
+    let folder = match args.twin.is_dir() {
+        true => Some(args.twin.as_path()),
+        false => args.twin.parent(),
+    };
+    let beside = Beside::of(args, verdicts, folder.filter(|_| !made_here))?;
     let made: Vec<crate::error::Result<Vec<File>>> =
         args.format.par_iter().map(|format| written(*format, &twin, &beside)).collect();
     for format in made {

@@ -18,6 +18,7 @@ mod keep;
 mod measure;
 mod moved;
 mod output;
+mod primitives;
 mod progress;
 mod synth;
 mod twin;

@@ -18,7 +18,7 @@ const FLOORS: [&[&str]; 17] = [
     &["pipeline"],
     &["fitting"],
     &["export", "validation", "evaluation"],
-    &["feedback"],
+    &["feedback", "primitives"],
     &["report"],
     &["cli"],
 ];

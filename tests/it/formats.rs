@@ -462,7 +462,16 @@ fn joints_of_elsewhere_become_files_in_every_format() {
     assert!(out.status.success(), "{}", crate::common::stderr(&out));
     let files = crate::common::tree(&dir.path().join("files"));
     let names: Vec<&str> = files.keys().map(String::as_str).collect();
-    let wanted = ["kitchen.xml", "physics.glb", "scene.glb", "scene.urdf", "scene.usda", "scene.xml", "twin.json"];
+    let wanted = [
+        "kitchen.xml",
+        "physics.glb",
+        "primitives.json",
+        "scene.glb",
+        "scene.urdf",
+        "scene.usda",
+        "scene.xml",
+        "twin.json",
+    ];
     assert_eq!(names, wanted);
     let twin: Twin = serde_json::from_slice(&files["twin.json"]).unwrap();
     assert_eq!(of_model(&twin).len(), 2);
