@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
+use super::clear;
 use crate::hands::{Trajectory, grip_std_m};
 use crate::math::{Point, Pose, Vector, any_orthogonal, reject, unit};
 use crate::twin::{Part, Role, Solid};
@@ -12,8 +13,8 @@ use crate::twin::{Part, Role, Solid};
 pub const STANDOFF_M: f64 = 0.10;
 /// As wide as common parallel grippers open, metres (Franka Hand).
 pub const WIDEST_M: f64 = 0.08;
-/// Free space on each side of a handle, metres: a hand tells its place to two or three centimetres.
-const FREE_M: f64 = 0.025;
+/// Free space on each side of a handle, metres: a recorded hand tells its place to three centimetres or so.
+const FREE_M: f64 = 0.035;
 
 /// What fingers close on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -40,6 +41,9 @@ pub struct Contact {
     pub width_m: Option<f64>,
     /// How far the fingertips are apart before they close, metres.
     pub gripper_opening_m: f64,
+    /// Turns about the bar, the gripper's y, from straight at the part's face: of the closed part (`approach` and `closing`
+    /// have it) and of the open one, rad; in between by the opening.
+    pub tilt_rad: [f64; 2],
 }
 
 /// A gripper's pose in the world.
@@ -62,6 +66,13 @@ pub(super) fn wxyz(rotation: &UnitQuaternion<f64>) -> [f64; 4] {
     let q = rotation.quaternion();
     let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
     [q.w, q.i, q.j, q.k].map(|c| sign * c)
+}
+
+/// The same contact with the gripper turned about the bar.
+#[must_use]
+pub(super) fn tilted(contact: &Contact, tilt_rad: [f64; 2]) -> Contact {
+    let turned = pose(contact).rotation * clear::turn(tilt_rad[0]);
+    Contact { approach: turned * Vector::z(), closing: turned * Vector::x(), tilt_rad, ..*contact }
 }
 
 /// The contact of a part: straight at its face, fingers across the bar of its handle.
@@ -92,6 +103,7 @@ pub fn contact(part: &Part) -> Contact {
         closing,
         width_m: width,
         gripper_opening_m: width.map_or(WIDEST_M, |w| (w + 2.0 * FREE_M).min(WIDEST_M)),
+        tilt_rad: [0.0; 2],
     }
 }
 
@@ -131,7 +143,7 @@ mod tests {
             assert!((contact.approach - Vector::y()).norm() < 1e-12, "{contact:?}");
             assert!((contact.closing - across).norm() < 1e-12, "{contact:?}");
             assert!((contact.width_m.unwrap() - 0.012).abs() < 1e-12);
-            assert!((contact.gripper_opening_m - 0.062).abs() < 1e-12);
+            assert!((contact.gripper_opening_m - WIDEST_M).abs() < 1e-12);
             assert_eq!((contact.hold, contact.point), (Hold::Handle, part.handle));
             let pose = pose(&contact);
             assert!((pose.rotation * Vector::z() - contact.approach).norm() < 1e-9);

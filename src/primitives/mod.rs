@@ -1,6 +1,7 @@
 //! What a robot needs to open and close each joint of a twin: where to take hold, the way of the gripper, and a Dynamic
 //! Movement Primitive of joint and gripper (the paper's section on manipulation). `docs/primitives.md` has every key.
 
+mod clear;
 pub mod dmp;
 pub mod grasp;
 pub mod timing;
@@ -158,8 +159,10 @@ pub fn of(twin: &Twin, seen: &BTreeMap<&str, Seen>) -> Primitives {
     let system = System::default();
     let nothing = Seen::default();
     let (mut joints, mut left_out) = (Vec::new(), Vec::new());
-    for part in twin.furniture.iter().map(|f| &f.part) {
-        match of_joint(part, seen.get(part.id.as_str()).unwrap_or(&nothing), &system) {
+    for (index, part) in twin.furniture.iter().map(|f| &f.part).enumerate() {
+        let straight = grasp::contact(part);
+        let contact = grasp::tilted(&straight, clear::tilt(twin, index, &straight));
+        match of_joint(part, contact, seen.get(part.id.as_str()).unwrap_or(&nothing), &system) {
             Some(joint) => joints.push(joint),
             None => left_out.push(LeftOut {
                 id: part.id.clone(),
@@ -181,15 +184,15 @@ pub fn of(twin: &Twin, seen: &BTreeMap<&str, Seen>) -> Primitives {
     }
 }
 
-fn of_joint(part: &Part, seen: &Seen, system: &System) -> Option<JointPrimitives> {
+fn of_joint(part: &Part, contact: Contact, seen: &Seen, system: &System) -> Option<JointPrimitives> {
     let (joint, phi) = (&part.joint, part.joint.articulation);
-    let contact = grasp::contact(part);
     let grasp = grasp::pose(&contact);
+    let held = Held { phi, grasp, turn: contact.tilt_rad[1] - contact.tilt_rad[0], upper: joint.upper };
     let back = Pose::from_parts((contact.approach * -grasp::STANDOFF_M).into(), nalgebra::UnitQuaternion::identity());
     let [opening, closing] =
         [(Action::Open, 0.0, joint.upper), (Action::Close, joint.upper, 0.0)].map(|(action, from, to)| {
             let timing = timing::timing(part, &seen.hands, action);
-            motion(&phi, &grasp, [from, to], timing, system)
+            motion(&held, [from, to], timing, system)
         });
     Some(JointPrimitives {
         joint: part.id.clone(),
@@ -230,21 +233,53 @@ fn sureness(part: &Part, seen: &Seen) -> Sureness {
     }
 }
 
-/// The way from one opening to another of a gripper that holds the part as `grasp` does when it is closed.
-fn motion(phi: &Articulation, grasp: &Pose, [from, to]: [f64; 2], timing: Timing, system: &System) -> Option<Motion> {
+/// A gripper at a part.
+struct Held {
+    /// The part's joint.
+    phi: Articulation,
+    /// The gripper at the closed part.
+    grasp: Pose,
+    /// How far it turns about the bar while the part opens, rad.
+    turn: f64,
+    /// The opening at which it has.
+    upper: f64,
+}
+
+impl Held {
+    fn turned(&self, opening: f64) -> f64 {
+        self.turn * opening / self.upper
+    }
+
+    /// Where the gripper is at an opening.
+    fn at(&self, opening: f64) -> Pose {
+        self.phi.motion(opening) * self.grasp * clear::turn(self.turned(opening))
+    }
+
+    /// Its rotation since another opening as a vector in world axes, beyond half a turn too: that of the hinge and that about
+    /// the bar add up where they are parallel. Elsewhere the logarithm is taken, which is short of half a turn.
+    fn since(&self, from: f64, opening: f64) -> Vector {
+        let hinge = match self.phi.kind {
+            JointKind::Revolute => self.phi.axis * (opening - from),
+            JointKind::Prismatic => Vector::zeros(),
+        };
+        let bar = self.at(from).rotation * Vector::y();
+        let about = bar * (self.turned(opening) - self.turned(from));
+        if hinge.cross(&about).norm() < 1e-9 {
+            return hinge + about;
+        }
+        (self.at(opening).rotation * self.at(from).rotation.inverse()).scaled_axis()
+    }
+}
+
+/// The way from one opening to another of a gripper that holds a part.
+fn motion(held: &Held, [from, to]: [f64; 2], timing: Timing, system: &System) -> Option<Motion> {
     let opening = |share: f64| from + (to - from) * timing::progress(share, timing.skew);
-    let gripper = |opening: f64| phi.motion(opening) * grasp;
     let shares = |count: usize| (0..count).map(move |i| i as f64 / (count - 1) as f64);
     let fitted: Vec<f64> = shares(FITTED).map(opening).collect();
     let poses: Vec<[f64; 6]> = fitted
         .iter()
         .map(|x| {
-            let position = gripper(*x).translation.vector;
-            // The joint's own turn: what a logarithm of the rotation would give, beyond half a turn too.
-            let turn = match phi.kind {
-                JointKind::Revolute => phi.axis * (x - from),
-                JointKind::Prismatic => Vector::zeros(),
-            };
+            let (position, turn) = (held.at(*x).translation.vector, held.since(from, *x));
             [position.x, position.y, position.z, turn.x, turn.y, turn.z]
         })
         .collect();
@@ -256,8 +291,8 @@ fn motion(phi: &Articulation, grasp: &Pose, [from, to]: [f64; 2], timing: Timing
     let openings: Vec<f64> = shares(PATH).map(opening).collect();
     let mut path = Path {
         times_secs: shares(PATH).map(|share| secs * share).collect(),
-        positions: openings.iter().map(|x| Point::from(gripper(*x).translation.vector)).collect(),
-        rotations_wxyz: openings.iter().map(|x| grasp::wxyz(&gripper(*x).rotation)).collect(),
+        positions: openings.iter().map(|x| Point::from(held.at(*x).translation.vector)).collect(),
+        rotations_wxyz: openings.iter().map(|x| grasp::wxyz(&held.at(*x).rotation)).collect(),
         openings,
     };
     let mut before: Option<[f64; 4]> = None;

@@ -49,7 +49,15 @@ pub(crate) fn door() -> Part {
 
 pub(crate) fn drawer() -> Part {
     let slide = Articulation { kind: JointKind::Prismatic, axis: -Vector::y(), origin: Point::new(0.25, 0.0, 0.5) };
-    part("drawer", slide, 0.44, Point::new(0.25, -0.035, 0.6), false)
+    let mut drawer = part("drawer", slide, 0.44, Point::new(0.25, -0.035, 0.6), false);
+    // Beside the door, out of its way.
+    let aside = Vector::new(3.0, 0.0, 0.0);
+    drawer.handle += aside;
+    drawer.bounds.center += aside;
+    for solid in &mut drawer.solids {
+        solid.shape.center += aside;
+    }
+    drawer
 }
 
 /// A hand that goes over a range of a part from or to closed, 30 samples a second.
@@ -67,16 +75,18 @@ pub(crate) fn hand(part: &Part, action: Action, secs: f64, skew: f64, range: f64
     Trajectory { side: None, samples, action, ends_seen: [true; 2] }
 }
 
+/// A twin of parts alone.
+pub(crate) fn twin_of(parts: Vec<Part>) -> Twin {
+    let furniture = parts
+        .into_iter()
+        .map(|part| Furniture { name: format!("{}_base", part.id), carcass: Vec::new(), part })
+        .collect();
+    Twin { name: "kitchen".to_owned(), density_kg_per_m3: 600.0, furniture, room: Vec::new(), left_out: Vec::new() }
+}
+
+/// A door and, beside it, a drawer.
 fn twin() -> Twin {
-    let furniture =
-        [door(), drawer()].map(|part| Furniture { name: format!("{}_base", part.id), carcass: Vec::new(), part });
-    Twin {
-        name: "kitchen".to_owned(),
-        density_kg_per_m3: 600.0,
-        furniture: furniture.to_vec(),
-        room: Vec::new(),
-        left_out: Vec::new(),
-    }
+    twin_of(vec![door(), drawer()])
 }
 
 #[test]
@@ -167,12 +177,32 @@ fn a_joint_that_cannot_move_costs_itself() {
     assert_eq!((made.joints[0].joint.as_str(), made.left_out[0].id.as_str()), ("drawer", "door"));
 }
 
+/// A gripper that turns about the bar while the part turns about its hinge, the two parallel.
+#[test]
+fn a_turn_about_the_bar_is_in_path_and_primitive() {
+    let part = door();
+    let contact = grasp::tilted(&grasp::contact(&part), [0.2, -0.8]);
+    let made = of_joint(&part, contact, &Seen::default(), &System::default()).unwrap();
+    assert!((made.opening.path.positions[PATH - 1] - made.closing.path.positions[0]).norm() < 1e-9);
+    for motion in [&made.opening, &made.closing] {
+        let quaternion = |i: usize| {
+            let [w, x, y, z] = motion.path.rotations_wxyz[i];
+            UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z))
+        };
+        let goal = Vector::new(motion.dmp_pose.goal[3], motion.dmp_pose.goal[4], motion.dmp_pose.goal[5]);
+        let end = UnitQuaternion::from_scaled_axis(goal) * quaternion(0);
+        assert!(end.angle_to(&quaternion(PATH - 1)) < 1e-6);
+    }
+    // From 0.2 to -0.8 about the bar, which is upright as the hinge is.
+    assert!((made.opening.dmp_pose.goal[5].abs() - 1.9).abs() > 0.9);
+}
+
 /// A joint that turns further than half a turn keeps turning.
 #[test]
 fn a_turn_of_more_than_half_is_one_turn() {
     let mut part = door();
     part.joint.upper = 3.6;
-    let made = of_joint(&part, &Seen::default(), &System::default()).unwrap();
+    let made = of_joint(&part, grasp::contact(&part), &Seen::default(), &System::default()).unwrap();
     let goal = &made.opening.dmp_pose.goal;
     assert!((goal[5] + 3.6).abs() < 1e-9, "{goal:?}");
     let end = made.opening.path.rotations_wxyz[PATH - 1];
@@ -207,7 +237,7 @@ fn the_file_has_the_keys_that_its_schema_promises_and_is_read_back() {
         ),
         (&joint["limits"], "lower upper observed expected"),
         (&joint["uncertainty"], "probability verdict across axis_std_rad origin_std_m observed_std contact_std_m"),
-        (&joint["contact"], "hold point approach closing width_m gripper_opening_m"),
+        (&joint["contact"], "hold point approach closing width_m gripper_opening_m tilt_rad"),
         (&joint["grasp"], "position rotation_wxyz"),
         (&joint["opening"], "from to timing path dmp_joint dmp_pose"),
         (&joint["opening"]["timing"], "source clip duration_secs skew"),
