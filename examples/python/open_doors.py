@@ -70,12 +70,12 @@ def add_gripper(spec):
             damping=40,
             armature=0.05,
         )
-        # Fingertips reach a centimetre beyond the middle of a handle: between bar and front is room for two.
+        # Fingertips reach 15 mm beyond the middle of a handle: between bar and front is room for twice as much.
         finger.add_geom(
             name=f"{GRIPPER}_{name}",
             type=mujoco.mjtGeom.mjGEOM_BOX,
-            size=[0.005, 0.010, 0.0275],
-            pos=[side * 0.005, 0, -0.0175],
+            size=[0.005, 0.010, 0.030],
+            pos=[side * 0.005, 0, -0.015],
             mass=0.05,
             friction=[1.0, 0.01, 0.001],
             condim=4,
@@ -130,24 +130,15 @@ def turned(vector, quat):
     return out
 
 
-def motion(primitive, opening):
-    """The rotation (w first) and shift of the world that opening a joint applies to its part."""
+def held(primitive, point, opening):
+    """Where opening a joint takes a point of its closed part."""
     axis, origin = np.array(primitive["axis"]), np.array(primitive["origin"])
     if primitive["type"] == "prismatic":
-        return np.array([1.0, 0, 0, 0]), axis * opening
+        return point + axis * opening
     quat, moved = np.zeros(4), np.zeros(3)
     mujoco.mju_axisAngle2Quat(quat, axis, opening)
-    mujoco.mju_rotVecQuat(moved, origin, quat)
-    return quat, origin - moved
-
-
-def carried(primitive, grasp, opening):
-    """Where a gripper is that holds the part at another place than the primitive says."""
-    quat, shift = motion(primitive, opening)
-    position, turn = np.zeros(3), np.zeros(4)
-    mujoco.mju_rotVecQuat(position, np.array(grasp["position"]), quat)
-    mujoco.mju_mulQuat(turn, quat, np.array(grasp["rotation_wxyz"]))
-    return position + shift, turn
+    mujoco.mju_rotVecQuat(moved, point - origin, quat)
+    return origin + moved
 
 
 def smooth(share):
@@ -246,21 +237,18 @@ class Run:
         for _ in range(int(round(secs / self.model.opt.timestep))):
             self.step()
 
-    def follow(self, system, motion, speed):
-        """A motion by the primitive of the pose; the start's orientation is the first of its path."""
+    def follow(self, system, primitive, way, speed, grasp=None):
+        """A motion by the primitive of the pose; the start's orientation is the first of its path. Of a part that is held
+        elsewhere (`grasp`) the places are those to which the primitive of the joint takes it, about the primitive's axis."""
+        motion, dt = primitive[way], self.model.opt.timestep
         secs = motion["dmp_pose"]["duration_secs"] / speed
         first = motion["path"]["rotations_wxyz"][0]
-        for y in rollout(system, motion["dmp_pose"], self.model.opt.timestep, secs):
+        poses = rollout(system, motion["dmp_pose"], dt, secs)
+        if grasp is not None:
+            openings = rollout(system, motion["dmp_joint"], dt, secs)[:, 0]
+            poses[:, :3] = [held(primitive, grasp, x) for x in openings]
+        for y in poses:
             self.to(y[:3], turned(y[3:], first))
-            self.step()
-        self.hold(REST_SECS)
-
-    def carry(self, system, primitive, way, grasp, speed):
-        """The same of a part that is held elsewhere: by the primitive of the joint, about the primitive's axis."""
-        dmp = primitive[way]["dmp_joint"]
-        secs = dmp["duration_secs"] / speed
-        for y in rollout(system, dmp, self.model.opt.timestep, secs):
-            self.to(*carried(primitive, grasp, y[0]))
             self.step()
         self.hold(REST_SECS)
 
@@ -284,10 +272,7 @@ def execute(model, name, primitive, system, speed, shift=None):
     run.hold(CLOSE_SECS)
     reached = []
     for way in ("opening", "closing"):
-        if shift is None:
-            run.follow(system, primitive[way], speed)
-        else:
-            run.carry(system, primitive, way, grasp, speed)
+        run.follow(system, primitive, way, speed, None if shift is None else grasp["position"])
         reached.append(run.opening)
     run.fingers(width)
     run.hold(CLOSE_SECS)

@@ -13,8 +13,8 @@ use crate::twin::{OrientedBox, Role, Twin};
 /// A common parallel gripper, gripper's axes, metres: centre and half sizes of its palm, half sizes of a finger, and how far
 /// a finger's middle is behind the fingertips' middle.
 const PALM: [[f64; 3]; 2] = [[0.0, 0.0, -0.065], [0.05, 0.02, 0.02]];
-const FINGER: [f64; 3] = [0.005, 0.010, 0.0275];
-const FINGER_BACK_M: f64 = 0.0175;
+const FINGER: [f64; 3] = [0.005, 0.010, 0.030];
+const FINGER_BACK_M: f64 = 0.015;
 /// Everything of the gripper is within this of the fingertips' middle, metres.
 const REACH_M: f64 = 0.13;
 /// Kept free around what is not the part, metres: half of how far the samples of a palm are apart, and of what furniture's
