@@ -23,6 +23,7 @@ mod known_truth;
 mod mjcf;
 mod models;
 mod physics;
+mod primitives;
 mod real_recordings;
 mod robust;
 mod same_bytes;
