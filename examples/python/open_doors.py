@@ -30,6 +30,8 @@ MASS, INERTIA = 0.8, 0.01
 # Half of what a Franka Hand holds with.
 GRIP_N = 35.0
 WIDEST_M = 0.08
+# The hand goes on beyond the grasp until it feels the front, at most so far, at this speed; then a little back. m, m/s, N.
+FEEL_M, FEEL_M_PER_S, FEEL_N, BACK_M = 0.045, 0.05, 8.0, 0.006
 # Seconds: from pregrasp to grasp, to close the fingers, and to come to rest at the end of a motion.
 APPROACH_SECS, CLOSE_SECS, REST_SECS = 1.0, 0.5, 0.5
 # A true joint belongs to a primitive if its handle is no farther than this, metres.
@@ -168,6 +170,7 @@ class Run:
         self.free = model.jnt_qposadr[mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, GRIPPER)]
         self.speed = model.jnt_dofadr[mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, GRIPPER)]
         self.peak_force = self.peak_torque = self.peak_off = 0.0
+        self.force = np.zeros(3)
         self.hits = {}
 
     @property
@@ -208,6 +211,8 @@ class Run:
         torque = TURN_STIFFNESS * turn + 2.0 * np.sqrt(TURN_STIFFNESS * INERTIA) * slow[3:]
         force *= min(1.0, FORCE_N / max(np.linalg.norm(force), 1e-9))
         torque *= min(1.0, TORQUE_NM / max(np.linalg.norm(torque), 1e-9))
+        # What the world pushes with at rest is what the spring pulls against.
+        self.force = -force
         d.qfrc_applied[self.speed : self.speed + 3] = force
         d.qfrc_applied[self.speed + 3 : self.speed + 6] = torque
         mujoco.mj_step(self.model, d)
@@ -237,6 +242,22 @@ class Run:
         for _ in range(int(round(secs / self.model.opt.timestep))):
             self.step()
 
+    def feel(self, position, approach):
+        """Goes on along the approach until the front pushes back; where the gripper then is asked to be."""
+        step = FEEL_M_PER_S * self.model.opt.timestep
+        gone, quat = 0.0, self.data.mocap_quat[0].copy()
+        while gone < FEEL_M and -self.force @ approach < FEEL_N:
+            gone += step
+            self.to(position + approach * gone, quat)
+            self.step()
+        # Nothing felt: there is no front in reach, and the handle is taken to be where it was thought.
+        kept = max(gone - BACK_M, 0.0) if gone < FEEL_M else 0.0
+        for x in straight({"position": approach * gone}, {"position": approach * kept}, self.model.opt.timestep, 0.5):
+            self.to(position + x, quat)
+            self.step()
+        self.hold(0.1)
+        return position + approach * kept
+
     def follow(self, system, primitive, way, speed, grasp=None):
         """A motion by the primitive of the pose; the start's orientation is the first of its path. Of a part that is held
         elsewhere (`grasp`) the places are those to which the primitive of the joint takes it, about the primitive's axis."""
@@ -259,7 +280,8 @@ def execute(model, name, primitive, system, speed, shift=None):
     run = Run(model, name)
     dt = model.opt.timestep
     width = min(primitive["contact"]["gripper_opening_m"], WIDEST_M)
-    off = np.zeros(3) if shift is None else shift
+    looked = shift is not None
+    off = shift if looked else np.zeros(3)
     before, grasp = (dict(p, position=np.array(p["position"]) + off) for p in (primitive["pregrasp"], primitive["grasp"]))
     run.begin(before, width)
     run.hold(0.1)
@@ -267,16 +289,17 @@ def execute(model, name, primitive, system, speed, shift=None):
         run.to(position, grasp["rotation_wxyz"])
         run.step()
     run.hold(0.2)
+    held_at = run.feel(grasp["position"], np.array(primitive["contact"]["approach"]))
     # Past the middle: the fingers stop where the handle is.
     run.fingers(-0.03)
     run.hold(CLOSE_SECS)
     reached = []
     for way in ("opening", "closing"):
-        run.follow(system, primitive, way, speed, None if shift is None else grasp["position"])
+        run.follow(system, primitive, way, speed, held_at if looked or not np.array_equal(held_at, grasp["position"]) else None)
         reached.append(run.opening)
     run.fingers(width)
     run.hold(CLOSE_SECS)
-    for position in straight(grasp, before, dt, APPROACH_SECS):
+    for position in straight(dict(grasp, position=held_at), before, dt, APPROACH_SECS):
         run.to(position, grasp["rotation_wxyz"])
         run.step()
     return run, *reached
