@@ -6,9 +6,9 @@
     python examples/python/open_doors.py demo/twin
     python examples/python/open_doors.py demo/twin --truth KITCHEN      # the same motions on another kitchen's scene.xml
 
-It reads `scene.xml` and `primitives.json` of a folder that `paws twin` or `paws export` wrote, and computes nothing of its own:
-the gripper goes to the pregrasp, to the grasp, closes, follows the Dynamic Movement Primitive of the pose, and back. Open loop:
-it does not look. docs/primitives.md explains every key.
+It reads `scene.xml` and `primitives.json` of a folder that `paws twin` or `paws export` wrote: the gripper goes to the pregrasp, to
+the grasp, feels for the front behind the handle, closes, follows the Dynamic Movement Primitive, and back. It does not look.
+docs/primitives.md explains every key.
 
 The gripper floats: a spring and a damper pull it to a mocap body, as an arm under impedance control would, with no more than
 `FORCE_N` and `TORQUE_NM`. Where a primitive is wrong, the wrist gives way, and the table says by how much.

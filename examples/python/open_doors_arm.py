@@ -6,8 +6,9 @@
     python examples/python/open_doors_arm.py demo/twin
 
 The arm's model is the one that the package gymnasium-robotics ships (Apache 2.0, by Vikash Kumar; the package itself is not
-imported). For each joint the arm is set down where mink's inverse kinematics brings its hand along the whole primitive with the
-least error, at the height of its own table or on a lift; then joint position control executes the primitive, open loop.
+imported). For each joint the arm is set down, at any height, as on a lift, where mink's inverse kinematics brings its hand along
+the part's whole way and neither arm nor hand is in anything; then joint position control executes the primitive of the joint,
+open loop, as far as a person was seen to open the part.
 """
 
 import argparse
@@ -65,13 +66,12 @@ def panda():
         for body in spec.bodies:
             # As a real arm's controller carries the arm.
             body.gravcomp = 1
-            for geom in body.geoms:
-                if geom.name == "" and body.name.endswith("finger"):
-                    geom.condim = 4
         for joint in spec.joints:
             if joint.name in ARM:
                 # The file's damping alone would take all of a motor's torque at 0.9 rad/s.
-                joint.damping = np.array([DAMPING[ARM.index(joint.name)], 0, 0]) if np.ndim(joint.damping) else DAMPING[ARM.index(joint.name)]
+                damping = DAMPING[ARM.index(joint.name)]
+                # Newer releases have three numbers there, of which the first is the linear one.
+                joint.damping = damping if np.ndim(joint.damping) == 0 else [damping, 0, 0]
                 joint.armature = 0.1
         for actuator in spec.actuators:
             if "gripper" in actuator.name:
