@@ -12,7 +12,7 @@
 //!
 //! [`pipeline::infer`] runs the paper and keeps every intermediate result; [`feedback::weighed`] asks physics about joints
 //! in doubt; [`fitting::fit`] builds the twin, [`appearance::look`] its surfaces; [`validation::validate`] replays the recorded
-//! hands; [`export`] writes it.
+//! hands; [`primitives::of`] makes of each joint what a robot needs to open it; [`export`] writes it.
 //!
 //! | paper | here |
 //! |---|---|
@@ -63,6 +63,7 @@ pub mod export;
 pub mod validation;
 
 pub mod feedback;
+pub mod primitives;
 
 pub mod report;
 

@@ -8,6 +8,8 @@ use rayon::prelude::*;
 
 use super::joints::{JointArgs, is_joints};
 use super::output::{restore, write_file};
+use super::primitives::{hands_beside, rows_beside, seen};
+use super::twin::JointHands;
 use super::{Answer, look, print, shown};
 use crate::evaluation::Predictions;
 use crate::export::annotations::{self, Shown};
@@ -15,7 +17,7 @@ use crate::import::ply::Cloud;
 use crate::import::{articulations, ply};
 use crate::look::Look;
 use crate::validation::Validation;
-use crate::{export, json, twin::Twin};
+use crate::{export, json, primitives, twin::Twin};
 
 /// A file format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -30,6 +32,8 @@ pub enum Format {
     GltfPhysics,
     /// OpenUSD with UsdPhysics, for Isaac: as text, and with its pictures as one file
     Usd,
+    /// What a robot needs to open each joint: grasp, path, Dynamic Movement Primitive (primitives.json; docs/primitives.md)
+    Primitives,
     /// Arti4D's list of joints (arti4d.json)
     Arti4d,
     /// EgoArti's list of clips and their annotations (egoarti_list.json, egoarti.json)
@@ -45,15 +49,15 @@ pub struct ExportArgs {
     /// other programs (docs/joints-format.md)
     twin: PathBuf,
     /// Formats, separated by commas
-    #[arg(long, value_delimiter = ',', default_value = "urdf,mjcf,gltf,gltf-physics,usd")]
+    #[arg(long, value_delimiter = ',', default_value = "urdf,mjcf,gltf,gltf-physics,usd,primitives")]
     format: Vec<Format>,
     #[command(flatten)]
     joints: JointArgs,
     /// Leave out what the twin looks like, which is read from the folder that `paws twin` wrote
     #[arg(long)]
     no_textures: bool,
-    /// Folder for scene.urdf, scene.xml, kitchen.xml, scene.glb, physics.glb, scene.usda, scene.usdz, look/; and for
-    /// twin.json where joints were given
+    /// Folder for scene.urdf, scene.xml, kitchen.xml, scene.glb, physics.glb, scene.usda, scene.usdz, look/, primitives.json;
+    /// and for twin.json where joints were given
     #[arg(long, value_name = "DIR", default_value = ".")]
     out: PathBuf,
 }
@@ -116,6 +120,10 @@ struct Beside {
     verdicts: Vec<(String, String)>,
     /// Clips with their joints.
     clips: Vec<Shown>,
+    /// Recorded hands of each joint.
+    hands: Vec<JointHands>,
+    /// How sure each joint is, by its clips.
+    rows: Predictions,
     /// The reconstruction.
     cloud: Option<Cloud>,
     /// What the twin looks like.
@@ -123,15 +131,25 @@ struct Beside {
 }
 
 impl Beside {
-    /// What the asked formats need.
-    fn of(args: &ExportArgs, verdicts: Vec<(String, String)>, look: Option<Look>) -> anyhow::Result<Self> {
+    /// What the asked formats need; `beside_twin` is the folder that a twin lies in.
+    fn of(
+        args: &ExportArgs,
+        verdicts: Vec<(String, String)>,
+        look: Option<Look>,
+        beside_twin: Option<&Path>,
+    ) -> anyhow::Result<Self> {
         let clips = if args.format.contains(&Format::Egoarti) { clips(&args.twin)? } else { Vec::new() };
         let cloud = match (&args.joints.points, args.format.contains(&Format::Usdnet)) {
             (_, false) => None,
             (Some(points), true) => Some(ply::read(points)?),
             (None, true) => bail!("usdnet: parts are points of a reconstruction: give it by --points FILE.ply"),
         };
-        Ok(Self { verdicts, clips, cloud, look })
+        // Joints found elsewhere have no recording, whatever else lies in their folder.
+        let (hands, rows) = match (beside_twin, args.format.contains(&Format::Primitives)) {
+            (Some(dir), true) => (hands_beside(dir)?, rows_beside(dir)?),
+            _ => (Vec::new(), Predictions { predictions: Vec::new() }),
+        };
+        Ok(Self { verdicts, clips, hands, rows, cloud, look })
     }
 }
 
@@ -166,6 +184,10 @@ fn written(format: Format, twin: &Twin, beside: &Beside) -> crate::error::Result
             ("scene.usda", export::usd::write(twin, look)?.into_bytes()),
             ("scene.usdz", export::usd::write_package(twin, look)?),
         ],
+        Format::Primitives => {
+            let seen = seen(&beside.hands, &beside.verdicts, &beside.rows);
+            vec![("primitives.json", json::text(&primitives::of(twin, &seen))?.into_bytes())]
+        }
         Format::Arti4d => vec![("arti4d.json", annotations::arti4d(twin)?.into_bytes())],
         Format::Egoarti => {
             let [list, all] = annotations::egoarti(twin, &beside.clips)?;
@@ -215,7 +237,11 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<Answer> {
             (twin, Vec::new(), None)
         }
     };
-    let beside = Beside::of(args, verdicts, look)?;
+    let folder = match args.twin.is_dir() {
+        true => Some(args.twin.as_path()),
+        false => args.twin.parent(),
+    };
+    let beside = Beside::of(args, verdicts, look, folder.filter(|_| !made_here))?;
     let made: Vec<crate::error::Result<Vec<File>>> =
         args.format.par_iter().map(|format| written(*format, &twin, &beside)).collect();
     for format in made {

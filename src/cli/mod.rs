@@ -29,6 +29,7 @@ mod moved;
 mod output;
 mod perceive;
 mod perceive_package;
+mod primitives;
 mod progress;
 mod synth;
 mod twin;

@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use anyhow::bail;
 use clap::Args;
 
 use super::output::{Kind, Output};
 use super::progress::Steps;
 use super::{Answer, print, shown};
 use crate::synth::{self, Changes, Options, Tier};
+use crate::{export, json};
 
 #[derive(Debug, Args)]
 pub struct SynthArgs {
@@ -47,6 +49,10 @@ pub struct SynthArgs {
     /// Folder for the recording
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Folder for the true kitchen: scene.xml, twin.json and ground_truth.json, to execute primitives on it
+    /// (docs/primitives.md); the parts are the truth's, not the recording's
+    #[arg(long, value_name = "DIR")]
+    kitchen: Option<PathBuf>,
 }
 
 pub fn run(args: &SynthArgs) -> anyhow::Result<Answer> {
@@ -60,9 +66,31 @@ pub fn run(args: &SynthArgs) -> anyhow::Result<Answer> {
         mask_error: args.mask_error,
         no_masks: args.no_masks,
     };
+    if let Some(kitchen) = &args.kitchen {
+        let [a, b] = [std::path::absolute(kitchen)?, std::path::absolute(&args.out)?];
+        if a.starts_with(&b) || b.starts_with(&a) {
+            bail!("{}: is in --out, or --out in it; choose another --kitchen", shown(kitchen));
+        }
+        write_kitchen(&options, &changes, kitchen)?;
+    }
     write_varied(&options, &changes, &args.out)?;
-    print(&format!("{}\n", shown(&args.out)))?;
+    for made in args.kitchen.iter().chain([&args.out]) {
+        print(&format!("{}\n", shown(made)))?;
+    }
     Ok(Answer::Yes)
+}
+
+/// Writes the true kitchen into a folder.
+fn write_kitchen(options: &Options, changes: &Changes, out: &Path) -> anyhow::Result<()> {
+    let output = Output::new(out, Kind::Twin, &[])?;
+    let recording = synth::Recorded::varied(options, changes)?;
+    let twin = recording.twin();
+    output.write("scene.xml", export::mjcf::write(&twin, None)?)?;
+    output.write("twin.json", json::text(&twin)?)?;
+    for (name, text) in recording.tables()?.into_iter().filter(|(name, _)| name == "ground_truth.json") {
+        output.write(&name, text)?;
+    }
+    output.finish()
 }
 
 /// Renders a recording into a folder.

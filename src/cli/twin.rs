@@ -23,7 +23,7 @@ use crate::report::table::aligned;
 use crate::report::{files, page, pictures, words};
 use crate::twin::Twin;
 use crate::validation::{self, Validation, Verdict, verdict::Hands};
-use crate::{export, fitting};
+use crate::{export, fitting, primitives};
 
 #[derive(Debug, Args)]
 pub struct TwinArgs {
@@ -55,7 +55,7 @@ pub struct TwinArgs {
 /// The folder of a look's files, as pages name it.
 const LOOK: &str = "look/";
 
-const FILES: [FileNote; 17] = [
+const FILES: [FileNote; 18] = [
     FileNote { name: "scene.urdf", what: "the twin for ROS, PyBullet, Drake, Pinocchio" },
     FileNote { name: "scene.xml", what: "the twin for MuJoCo, with floor, light and keyframes" },
     FileNote {
@@ -72,6 +72,10 @@ const FILES: [FileNote; 17] = [
     FileNote { name: "predictions.json", what: "one row a clip, for `paws evaluate`" },
     FileNote { name: "twin.json", what: "boxes, joints and masses: the model behind all formats" },
     FileNote { name: "validation.json", what: "every replay: errors, forces, contacts, ranges, rivals, the margin" },
+    FileNote {
+        name: "primitives.json",
+        what: "for robots: grasp, path of the gripper and Dynamic Movement Primitive of each joint",
+    },
     FileNote { name: "proof/", what: "the pictures of this page, one a joint" },
     FileNote { name: "trajectories.json", what: "the recorded hands that belong to each joint" },
     FileNote { name: "config.toml", what: "the parameters that were used" },
@@ -189,9 +193,13 @@ pub fn make(
     steps.report("writing", 0, 1);
     let glb = models(&output, &twin, look.as_ref(), &validation)?;
     output.write("articulations.json", files::articulations(&scene, &reasoner)?)?;
-    output.write("predictions.json", json::text(&files::predictions(&scene, &twin))?)?;
+    let rows = files::predictions(&scene, &twin);
+    output.write("predictions.json", json::text(&rows)?)?;
     output.write("twin.json", json::text(&twin)?)?;
     output.write("validation.json", json::text(&validation)?)?;
+    let verdicts = validation.words();
+    let moves = primitives::of(&twin, &super::primitives::seen(&hands, &verdicts, &rows));
+    output.write("primitives.json", json::text(&moves)?)?;
     for (furniture, check) in twin.furniture.iter().zip(&validation.joints) {
         output.write(&format!("proof/{}.svg", file_name(&check.id)), pictures::proof(furniture, check))?;
     }

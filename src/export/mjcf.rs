@@ -20,6 +20,8 @@ fn list(values: &[f64]) -> String {
 
 /// The body that holds all furniture: a scene can move the kitchen as one, and Pinocchio reads one root body only.
 pub(crate) const ROOT: &str = "kitchen";
+/// How far below the lowest point of what moves the floor's plane is at least, metres: no contact, and not to be seen.
+const UNDER_M: f64 = 0.002;
 /// What the names of the room's boxes begin with that people stand on.
 const ROOM_FLOOR: &str = "room_floor";
 
@@ -163,10 +165,12 @@ fn floor_and_light(xml: &mut Xml, twin: &Twin) -> std::io::Result<()> {
     let low = corners.iter().map(|c| c.z).fold(f64::INFINITY, f64::min);
     let high = corners.iter().map(|c| c.z).fold(f64::NEG_INFINITY, f64::max);
     let middle = crate::math::centroid(&corners).unwrap_or(Point::origin());
-    // On the room's floor; where the recording does not tell it, just under the lowest point.
+    // On the room's floor; where the recording does not tell it, just under the lowest point. A plane has no end, the room's
+    // floor has one: a part that goes below it elsewhere must not stick in the plane.
     let of_room = twin.room.iter().filter(|s| s.name.starts_with(ROOM_FLOOR)).flat_map(|s| s.shape.corners());
+    let moving = twin.furniture.iter().flat_map(|f| opened(&f.part)).map(|c| c.z).fold(f64::INFINITY, f64::min);
     let floor = match of_room.map(|c| c.z).max_by(f64::total_cmp) {
-        Some(top) => top,
+        Some(top) => top.min(moving - UNDER_M),
         None if low.is_finite() => low - 0.01,
         None => 0.0,
     };

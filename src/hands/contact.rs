@@ -526,6 +526,9 @@ mod tests {
     #[test]
     fn gaps_are_filled_only_where_they_are_short() {
         let known = [Some(0.0), None, Some(1.0), None, Some(2.0)];
-        assert_eq!(between(&[0.0, 0.1, 0.2, 5.0, 9.0], &known, 0.5), [Some(0.0), Some(0.5), Some(1.0), None, Some(2.0)]);
+        assert_eq!(
+            between(&[0.0, 0.1, 0.2, 5.0, 9.0], &known, 0.5),
+            [Some(0.0), Some(0.5), Some(1.0), None, Some(2.0)]
+        );
     }
 }

@@ -147,7 +147,8 @@ pub fn trajectory(
             let samples = samples_of(side, clip.start_frame, clip.end_frame);
             in_clip += samples.len();
             if let Some(hold) = hold {
-                let held = if side == hold.side { samples_of(side, hold.frames[0], hold.frames[1]) } else { Vec::new() };
+                let held =
+                    if side == hold.side { samples_of(side, hold.frames[0], hold.frames[1]) } else { Vec::new() };
                 return (held.len(), side, held);
             }
             if !use_contact {
@@ -345,7 +346,8 @@ mod tests {
             files: Default::default(),
         });
         let tip = |i: usize| Point::new(0.0, 0.05 * i as f64, 0.6);
-        let hand = |i: usize| HandSample { frame: i, side: Side::Left, contact: Some(false), tips: [tip(i); 3], joints: None };
+        let hand =
+            |i: usize| HandSample { frame: i, side: Side::Left, contact: Some(false), tips: [tip(i); 3], joints: None };
         let clip = |narration: &str| Clip {
             clip: "c".to_owned(),
             start_frame: 1,

@@ -17,6 +17,7 @@ pub mod noise;
 pub mod person;
 pub mod render;
 pub mod session;
+mod solid;
 mod tables;
 pub mod tiers;
 
@@ -276,6 +277,13 @@ impl Recorded {
     #[must_use]
     pub fn kitchen(&self) -> &kitchen::Kitchen {
         &self.kitchen
+    }
+
+    /// The same as a twin that simulates. Never an input of the pipeline.
+    #[must_use]
+    pub fn twin(&self) -> crate::twin::Twin {
+        let name = format!("kitchen_{}", self.options.seed);
+        solid::twin(&self.kitchen, name, &self.up, &crate::config::Config::default().fitting)
     }
 
     /// Number of frames.

@@ -18,7 +18,7 @@ const FLOORS: [&[&str]; 18] = [
     &["pipeline"],
     &["fitting"],
     &["appearance", "export", "validation", "evaluation"],
-    &["feedback"],
+    &["feedback", "primitives"],
     &["report"],
     &["batch"],
     &["cli"],

@@ -381,6 +381,23 @@ fn furnished() -> Twin {
 }
 
 #[test]
+fn no_part_sticks_in_the_floors_plane() {
+    let mut twin = furnished();
+    let corners = |twin: &Twin| -> f64 {
+        let solids = twin.furniture.iter().flat_map(|f| &f.part.solids);
+        solids.flat_map(|s| s.shape.corners()).map(|c| c.z).fold(f64::INFINITY, f64::min)
+    };
+    let lowest = corners(&twin);
+    // Its surface is 5 cm above the lowest part; the room's own floor may end before that part, a plane does not.
+    twin.room[0].shape.center.z = lowest;
+    let text = export::mjcf::write(&twin).unwrap();
+    let floor = text.split("name=\"floor\"").nth(1).unwrap();
+    let place = floor.split("pos=\"").nth(1).unwrap().split('"').next().unwrap();
+    let height: f64 = place.split(' ').nth(2).unwrap().parse().unwrap();
+    assert!(height < lowest, "{height} {lowest}");
+}
+
+#[test]
 fn the_room_stands_still_and_springs_carry_in_every_format_that_can_say_so() {
     let twin = furnished();
     let balanced = &twin.furniture[0].part.id;
@@ -462,8 +479,17 @@ fn joints_of_elsewhere_become_files_in_every_format() {
     assert!(out.status.success(), "{}", crate::common::stderr(&out));
     let files = crate::common::tree(&dir.path().join("files"));
     let names: Vec<&str> = files.keys().map(String::as_str).collect();
-    let wanted =
-        ["kitchen.xml", "physics.glb", "scene.glb", "scene.urdf", "scene.usda", "scene.usdz", "scene.xml", "twin.json"];
+    let wanted = [
+        "kitchen.xml",
+        "physics.glb",
+        "primitives.json",
+        "scene.glb",
+        "scene.urdf",
+        "scene.usda",
+        "scene.usdz",
+        "scene.xml",
+        "twin.json",
+    ];
     assert_eq!(names, wanted);
     let twin: Twin = serde_json::from_slice(&files["twin.json"]).unwrap();
     assert_eq!(of_model(&twin).len(), 2);

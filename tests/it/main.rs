@@ -27,6 +27,7 @@ mod mjcf;
 mod models;
 mod perceive;
 mod physics;
+mod primitives;
 mod python_module;
 mod real_recordings;
 mod robust;
