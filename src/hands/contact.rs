@@ -25,15 +25,22 @@ pub struct Hold {
 const REACH_M: f64 = 0.3;
 /// Distances of a hand in the air fall off with this, metres: about half of the way that a hand reaches.
 const FREE_M: f64 = 0.3;
-/// Share of the samples of a hold of which the distance says nothing: hands that are placed wrongly.
-const ASTRAY: f64 = 0.1;
+/// Share of the samples of a hold of which the distance says nothing: hands that are placed wrongly, depth of something else.
+const ASTRAY: f64 = 0.25;
+/// How long people hold what they open or close, seconds: the middle, and the standard deviation of its logarithm (two thirds
+/// of all holds last 0.75 to 3 s). A judgement; it keeps a single near sample from being a hold.
+const HOLD_SECS: f64 = 1.5;
+const HOLD_LOG_STD: f64 = 0.7;
 /// One sample says no more than this for or against contact, nats: its neighbours have the same error.
 const SAYS_AT_MOST: f64 = 3.0;
 /// Still frames before and after the clip that are looked at, and how far away they may be.
 const STILL_FRAMES: usize = 3;
 const STILL_WITHIN_SECS: f64 = 4.0;
-/// No recording knows distances better than this, metres.
-const LEAST_STD_M: f64 = 0.01;
+/// Distances vary by no less than this, metres: fingers lie around a handle, depth is smooth over its edge. The samples that
+/// are taken for contact are the near ones, so that what they show is too little.
+const LEAST_STD_M: f64 = 0.03;
+/// The same from clip to clip.
+const LEAST_BETWEEN_M: f64 = 0.01;
 
 /// For each clip the stretch in which a hand holds something; `None` where the narration moves nothing, no hand was seen or
 /// nothing speaks for contact.
@@ -77,8 +84,9 @@ pub fn holds(recording: &Recording, at_work: &AtWork, config: &config::Hands) ->
 #[derive(Debug, Clone)]
 struct Track {
     side: Side,
-    /// Frames in which it was seen.
+    /// Frames in which it was seen, and their times, seconds.
     frames: Vec<usize>,
+    times: Vec<f64>,
     /// Distance of the fingertips to the nearest surface that is not a hand, metres: now, before and after the clip.
     /// `None` where nobody knows.
     now: Vec<Option<f64>>,
@@ -117,6 +125,7 @@ fn clip_tracks(recording: &Recording, clip: &Clip, at_work: &AtWork, config: &co
         tracks.push(Track {
             side,
             frames: samples.iter().map(|s| s.frame).collect(),
+            times: samples.iter().map(|s| recording.frames[s.frame].timestamp_secs).collect(),
             now: vec![None; n],
             before: vec![None; n],
             after: vec![None; n],
@@ -147,10 +156,8 @@ fn clip_tracks(recording: &Recording, clip: &Clip, at_work: &AtWork, config: &co
             }
         }
     }
-    let time = |f: usize| recording.frames[f].timestamp_secs;
     for track in &mut tracks {
-        let times: Vec<f64> = track.frames.iter().map(|&f| time(f)).collect();
-        track.now = between(&times, &track.now, 2.5 * config.contact_every_secs);
+        track.now = between(&track.times, &track.now, 2.5 * config.contact_every_secs);
     }
     Ok(tracks)
 }
@@ -239,13 +246,11 @@ impl Widths {
         let medians: Vec<Option<f64>> = cores.iter().map(|c| stats::median(c)).collect();
         let all: Vec<f64> = cores.iter().flatten().copied().collect();
         let Some(mean) = stats::median(&all) else { return Self::default() };
-        let spread = |deviations: Vec<f64>| {
-            let median = stats::median(&deviations).unwrap_or(0.0);
-            (1.4826 * median).max(LEAST_STD_M)
-        };
+        let spread = |deviations: Vec<f64>| 1.4826 * stats::median(&deviations).unwrap_or(0.0);
         let own = cores.iter().zip(&medians).filter(|(core, _)| core.len() > 2);
-        let std = spread(own.flat_map(|(core, m)| core.iter().map(move |d| (d - m.unwrap_or(*d)).abs())).collect());
-        let between = spread(medians.iter().flatten().map(|m| (m - mean).abs()).collect());
+        let deviations = own.flat_map(|(core, m)| core.iter().map(move |d| (d - m.unwrap_or(*d)).abs()));
+        let std = spread(deviations.collect()).max(LEAST_STD_M);
+        let between = spread(medians.iter().flatten().map(|m| (m - mean).abs()).collect()).max(LEAST_BETWEEN_M);
         let by_clip = cores
             .iter()
             .zip(&medians)
@@ -326,27 +331,36 @@ fn spans(tracks: &[Vec<Track>], widths: &Widths, flags: &Flags) -> Vec<Option<Sp
         .collect()
 }
 
-/// Sum of what each sample says, and of how near the furniture is to the first sample before the clip, to the last one
-/// after it: before, during and after are one chain.
+/// Sum of what each sample says, of how near the furniture is to the first sample before the clip and to the last one after
+/// it, and of how long holds last: before, during and after are one chain.
 fn best_span(index: usize, track: &Track, clip: usize, widths: &Widths, flags: &Flags) -> Option<Span> {
-    let n = track.frames.len();
-    let mut sum = 0.0;
-    let mut start: Option<(f64, usize)> = None;
+    let says = track.now.iter().zip(&track.flags).map(|(now, flag)| {
+        let nats = widths.nats(clip, *now) + flags.nats(*flag);
+        nats.clamp(-SAYS_AT_MOST, SAYS_AT_MOST)
+    });
+    // `sums[i]`: what all samples before the i-th say.
+    let mut sums = vec![0.0];
+    for nats in says {
+        sums.push(sums[sums.len() - 1] + nats);
+    }
+    let ends: Vec<f64> = (0..track.frames.len()).map(|j| sums[j + 1] + widths.nats(clip, track.after[j])).collect();
     let mut best: Option<Span> = None;
-    for i in 0..n {
-        let begin = widths.nats(clip, track.before[i]) - sum;
-        if i <= track.starts_by && start.is_none_or(|(b, _)| begin > b) {
-            start = Some((begin, i));
-        }
-        let says = widths.nats(clip, track.now[i]) + flags.nats(track.flags[i]);
-        sum += says.clamp(-SAYS_AT_MOST, SAYS_AT_MOST);
-        let Some((begin, first)) = start.filter(|_| i >= track.ends_from) else { continue };
-        let nats = begin + sum + widths.nats(clip, track.after[i]);
-        if nats > 0.0 && best.is_none_or(|b| nats > b.nats) {
-            best = Some(Span { track: index, first, last: i, nats });
+    for first in 0..=track.starts_by {
+        let begin = widths.nats(clip, track.before[first]) - sums[first];
+        for last in first.max(track.ends_from)..track.frames.len() {
+            let nats = begin + ends[last] + lasts(track.times[last] - track.times[first]);
+            if nats > 0.0 && best.is_none_or(|b| nats > b.nats) {
+                best = Some(Span { track: index, first, last, nats });
+            }
         }
     }
     best
+}
+
+/// Log likelihood of how long a hold lasts, against the most likely one.
+fn lasts(secs: f64) -> f64 {
+    // A frame is not less than a twentieth of a second.
+    -0.5 * ((secs.max(0.05) / HOLD_SECS).ln() / HOLD_LOG_STD).powi(2)
 }
 
 /// A frame's depth without hands.
@@ -469,11 +483,12 @@ mod tests {
             8..28 => 0.03 + 0.01 * ((i * 7 % 5) as f64 / 4.0 - 0.5),
             _ => 0.03 + 0.03 * (i - 27) as f64,
         };
-        let n = 36;
+        let n = 36usize;
         let held = |i: usize| (8..28).contains(&i);
         Track {
             side: Side::Right,
             frames: (100..100 + n).collect(),
+            times: (0..n).map(|i| i as f64 / 12.0).collect(),
             now: (0..n).map(|i| Some(distance(i))).collect(),
             before: (0..n).map(|i| (i < 12).then_some(distance(i))).collect(),
             after: (0..n).map(|i| (i > 24).then_some(distance(i))).collect(),

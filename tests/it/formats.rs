@@ -390,7 +390,7 @@ fn no_part_sticks_in_the_floors_plane() {
     let lowest = corners(&twin);
     // Its surface is 5 cm above the lowest part; the room's own floor may end before that part, a plane does not.
     twin.room[0].shape.center.z = lowest;
-    let text = export::mjcf::write(&twin).unwrap();
+    let text = export::mjcf::write(&twin, None).unwrap();
     let floor = text.split("name=\"floor\"").nth(1).unwrap();
     let place = floor.split("pos=\"").nth(1).unwrap().split('"').next().unwrap();
     let height: f64 = place.split(' ').nth(2).unwrap().parse().unwrap();
