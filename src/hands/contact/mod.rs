@@ -2,7 +2,12 @@
 //! furniture before and after, and a detector's flags as far as they agree with these.
 //!
 //! A hand that holds a part has the part's surface at its fingertips in every frame; one that reaches or withdraws has air
-//! there. How far the surface is from the fingertips, and how much that varies, is measured in each recording.
+//! there. It rests where it takes hold and where it lets go, and goes along a line or an arc in between. How far the surface
+//! is from the fingertips, how much that varies, how much hands tremble and how often flags are right is measured in each
+//! recording.
+
+mod motion;
+mod view;
 
 use rayon::prelude::*;
 
@@ -10,7 +15,8 @@ use super::widened;
 use crate::config;
 use crate::error::Result;
 use crate::math::{Point, stats};
-use crate::recording::{AtWork, Clip, Frame, Grid, HAND_CLASS, HandSample, Recording, Side, narration};
+use crate::recording::{AtWork, Clip, HandSample, Recording, Side, narration};
+use view::View;
 
 /// The stretch of a clip in which a hand holds something.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,6 +39,8 @@ const HOLD_SECS: f64 = 1.5;
 const HOLD_LOG_STD: f64 = 0.7;
 /// One sample says no more than this for or against contact, nats: its neighbours have the same error.
 const SAYS_AT_MOST: f64 = 3.0;
+/// Neighbouring flags are wrong together: half of each is news. A judgement.
+const FLAG_NEWS: f64 = 0.5;
 /// Still frames before and after the clip that are looked at, and how far away they may be.
 const STILL_FRAMES: usize = 3;
 const STILL_WITHIN_SECS: f64 = 4.0;
@@ -51,7 +59,7 @@ pub fn holds(recording: &Recording, at_work: &AtWork, config: &config::Hands) ->
     if !config.use_contact || !config.contact_from_depth {
         return Ok(vec![None; recording.clips.len()]);
     }
-    let tracks: Vec<Vec<Track>> = recording
+    let mut tracks: Vec<Vec<Track>> = recording
         .clips
         .par_iter()
         .map(|clip| match narration::read(clip).moves_joint {
@@ -59,16 +67,7 @@ pub fn holds(recording: &Recording, at_work: &AtWork, config: &config::Hands) ->
             _ => clip_tracks(recording, clip, at_work, config),
         })
         .collect::<Result<_>>()?;
-    let mut widths = Widths::default();
-    let mut spans = spans(&tracks, &widths, &Flags::default());
-    // Widths from what is taken for contact, contact from the widths: it settles at once, as the middle of a hold is certain.
-    for _ in 0..2 {
-        widths = Widths::of(&tracks, &spans);
-        spans = self::spans(&tracks, &widths, &Flags::default());
-    }
-    // Geometry alone judges the flags; then they speak, too.
-    let flags = Flags::of(&tracks, &spans);
-    let spans = self::spans(&tracks, &widths, &flags);
+    let spans = settled(&mut tracks);
     Ok(tracks
         .iter()
         .zip(&spans)
@@ -80,6 +79,27 @@ pub fn holds(recording: &Recording, at_work: &AtWork, config: &config::Hands) ->
         .collect())
 }
 
+/// Holds, widths and flags explain each other: three rounds, in the last of which the flags speak, too.
+fn settled(tracks: &mut [Vec<Track>]) -> Vec<Option<Span>> {
+    let tremble = motion::tremble_m(tracks.iter().flatten().map(|t| (t.times.as_slice(), t.places.as_slice())));
+    for track in tracks.iter_mut().flatten() {
+        track.rests = motion::rests(&track.times, &track.places, tremble);
+    }
+    let mut widths = Widths::default();
+    let mut found = spans(tracks, &widths, &Flags::default());
+    for round in 0..3 {
+        widths = Widths::of(tracks, &found);
+        let flags = if round == 2 { Flags::of(tracks, &found) } else { Flags::default() };
+        for (tracks, span) in tracks.iter_mut().zip(&found) {
+            let Some(span) = span else { continue };
+            let track = &mut tracks[span.track];
+            track.on_path = motion::on_path(&track.places, span.first, span.last, tremble);
+        }
+        found = spans(tracks, &widths, &flags);
+    }
+    found
+}
+
 /// One hand in and around a clip.
 #[derive(Debug, Clone)]
 struct Track {
@@ -87,12 +107,20 @@ struct Track {
     /// Frames in which it was seen, and their times, seconds.
     frames: Vec<usize>,
     times: Vec<f64>,
+    /// Where the fingertips are, world.
+    places: Vec<Point>,
     /// Distance of the fingertips to the nearest surface that is not a hand, metres: now, before and after the clip.
     /// `None` where nobody knows.
     now: Vec<Option<f64>>,
     before: Vec<Option<f64>>,
     after: Vec<Option<f64>>,
     flags: Vec<Option<bool>>,
+    /// Log odds of each sample for being the first and the last of a hold, by whether the hand rests.
+    rests: Vec<[f64; 2]>,
+    /// Log odds of contact by the line or arc of the hold that was found before; `None` where it shows none.
+    on_path: Option<Vec<f64>>,
+    /// A hold stays within one stretch.
+    stretches: Vec<usize>,
     /// A hold starts at this sample at the latest and ends at that one at the earliest: it overlaps the clip.
     starts_by: usize,
     ends_from: usize,
@@ -111,7 +139,6 @@ fn clip_tracks(recording: &Recording, clip: &Clip, at_work: &AtWork, config: &co
     let [from, to] = widened(recording, clip, config.widen_secs);
     let around = recording.hands_in(from, to);
     let mut tracks: Vec<Track> = Vec::new();
-    let mut places: Vec<Vec<Point>> = Vec::new();
     for side in [Side::Right, Side::Left] {
         let samples: Vec<&HandSample> = around.iter().filter(|s| s.side == side).collect();
         let (Some(ends_from), Some(starts_by)) = (
@@ -121,11 +148,16 @@ fn clip_tracks(recording: &Recording, clip: &Clip, at_work: &AtWork, config: &co
             continue;
         };
         let n = samples.len();
-        places.push(samples.iter().map(|s| s.grasp()).collect());
+        let times: Vec<f64> = samples.iter().map(|s| recording.frames[s.frame].timestamp_secs).collect();
+        let places: Vec<Point> = samples.iter().map(|s| s.grasp()).collect();
         tracks.push(Track {
             side,
             frames: samples.iter().map(|s| s.frame).collect(),
-            times: samples.iter().map(|s| recording.frames[s.frame].timestamp_secs).collect(),
+            stretches: motion::stretches(&times, &places),
+            times,
+            places,
+            rests: vec![[0.0; 2]; n],
+            on_path: None,
             now: vec![None; n],
             before: vec![None; n],
             after: vec![None; n],
@@ -136,18 +168,18 @@ fn clip_tracks(recording: &Recording, clip: &Clip, at_work: &AtWork, config: &co
     }
     for frame in looked_at(recording, &tracks, config.contact_every_secs) {
         let Some(view) = View::of(recording, frame)? else { continue };
-        for (track, places) in tracks.iter_mut().zip(&places) {
+        for track in &mut tracks {
             // Two rows of one frame and side are rare; the first has the distance.
             if let Ok(i) = track.frames.binary_search(&frame) {
-                track.now[i] = view.nearest_m(&places[i]);
+                track.now[i] = view.nearest_m(&track.places[i]);
             }
         }
     }
     for (still, is_before) in still_frames(recording, clip, at_work) {
         let Some(view) = View::of(recording, still)? else { continue };
-        for (track, places) in tracks.iter_mut().zip(&places) {
+        for track in &mut tracks {
             let known = if is_before { &mut track.before } else { &mut track.after };
-            for (known, place) in known.iter_mut().zip(places) {
+            for (known, place) in known.iter_mut().zip(&track.places) {
                 let seen = view.nearest_m(place);
                 *known = match (*known, seen) {
                     (Some(a), Some(b)) => Some(a.min(b)),
@@ -308,11 +340,12 @@ impl Flags {
     }
 
     fn nats(&self, flag: Option<bool>) -> f64 {
-        match flag {
-            Some(true) => self.set,
-            Some(false) => self.unset,
-            None => 0.0,
-        }
+        FLAG_NEWS
+            * match flag {
+                Some(true) => self.set,
+                Some(false) => self.unset,
+                None => 0.0,
+            }
     }
 }
 
@@ -334,20 +367,24 @@ fn spans(tracks: &[Vec<Track>], widths: &Widths, flags: &Flags) -> Vec<Option<Sp
 /// Sum of what each sample says, of how near the furniture is to the first sample before the clip and to the last one after
 /// it, and of how long holds last: before, during and after are one chain.
 fn best_span(index: usize, track: &Track, clip: usize, widths: &Widths, flags: &Flags) -> Option<Span> {
-    let says = track.now.iter().zip(&track.flags).map(|(now, flag)| {
-        let nats = widths.nats(clip, *now) + flags.nats(*flag);
-        nats.clamp(-SAYS_AT_MOST, SAYS_AT_MOST)
+    let says = track.now.iter().zip(&track.flags).enumerate().map(|(i, (now, flag))| {
+        let on_path = track.on_path.as_ref().map_or(0.0, |nats| nats[i]);
+        (widths.nats(clip, *now) + flags.nats(*flag) + on_path).clamp(-SAYS_AT_MOST, SAYS_AT_MOST)
     });
     // `sums[i]`: what all samples before the i-th say.
     let mut sums = vec![0.0];
     for nats in says {
         sums.push(sums[sums.len() - 1] + nats);
     }
-    let ends: Vec<f64> = (0..track.frames.len()).map(|j| sums[j + 1] + widths.nats(clip, track.after[j])).collect();
+    let ends: Vec<f64> =
+        (0..track.frames.len()).map(|j| sums[j + 1] + widths.nats(clip, track.after[j]) + track.rests[j][1]).collect();
     let mut best: Option<Span> = None;
     for first in 0..=track.starts_by {
-        let begin = widths.nats(clip, track.before[first]) - sums[first];
+        let begin = widths.nats(clip, track.before[first]) + track.rests[first][0] - sums[first];
         for last in first.max(track.ends_from)..track.frames.len() {
+            if track.stretches[last] != track.stretches[first] {
+                break;
+            }
             let nats = begin + ends[last] + lasts(track.times[last] - track.times[first]);
             if nats > 0.0 && best.is_none_or(|b| nats > b.nats) {
                 best = Some(Span { track: index, first, last, nats });
@@ -361,115 +398,6 @@ fn best_span(index: usize, track: &Track, clip: usize, widths: &Widths, flags: &
 fn lasts(secs: f64) -> f64 {
     // A frame is not less than a twentieth of a second.
     -0.5 * ((secs.max(0.05) / HOLD_SECS).ln() / HOLD_LOG_STD).powi(2)
-}
-
-/// A frame's depth without hands.
-struct View<'a> {
-    recording: &'a Recording,
-    frame: &'a Frame,
-    depth: Grid<f32>,
-    mask: Option<Grid<u8>>,
-    /// Bones of the hands that the mask misses, in pixels: ends and half width.
-    bones: Vec<([f64; 2], [f64; 2], f64)>,
-    /// Pixels by which masks are taken to be off at a hand's rim.
-    rim: isize,
-}
-
-impl<'a> View<'a> {
-    fn of(recording: &'a Recording, index: usize) -> Result<Option<Self>> {
-        let Some(frame) = recording.frames.get(index).filter(|f| f.files.depth.is_some()) else { return Ok(None) };
-        let Some(depth) = recording.depth(index)? else { return Ok(None) };
-        let mask = recording.mask(index)?;
-        // Four pixels of 640: what segmenters smear.
-        let rim = ((recording.camera.width as f64 / 160.0).round() as isize).max(1);
-        let mut view = Self { recording, frame, depth, mask, bones: Vec::new(), rim };
-        for hand in recording.hands_in(index, index) {
-            view.bones.extend(view.missed_bones(hand));
-        }
-        Ok(Some(view))
-    }
-
-    /// A hand's bones where the mask does not show the hand.
-    fn missed_bones(&self, hand: &HandSample) -> Vec<([f64; 2], [f64; 2], f64)> {
-        /// Half of a finger's breadth and what a tracked hand is off sideways, metres.
-        const HALF_WIDTH_M: f64 = 0.03;
-        let camera_from_world = self.frame.world_from_camera.inverse();
-        let camera = &self.recording.camera;
-        let on_image = |p: &Point| {
-            let local = camera_from_world * p;
-            camera.project(&local).map(|(u, v)| ([u, v], HALF_WIDTH_M * camera.fx / local.z))
-        };
-        let points = hand.skeleton();
-        let seen: Vec<[f64; 2]> = points.iter().filter_map(|p| on_image(p).map(|(uv, _)| uv)).collect();
-        let masked = seen.iter().filter(|uv| self.is_masked(uv[0], uv[1])).count();
-        if seen.is_empty() || 3 * masked > seen.len() {
-            return Vec::new();
-        }
-        let bones = hand.bones();
-        bones
-            .iter()
-            .filter_map(|[a, b]| {
-                let ((a, wide), (b, _)) = (on_image(a)?, on_image(b)?);
-                Some((a, b, wide))
-            })
-            .collect()
-    }
-
-    fn is_masked(&self, u: f64, v: f64) -> bool {
-        let Some(mask) = &self.mask else { return false };
-        let (u, v) = (u.round() as isize, v.round() as isize);
-        [-self.rim, 0, self.rim].iter().any(|dv| {
-            [-self.rim, 0, self.rim].iter().any(|du| {
-                let (x, y) = (u + du, v + dv);
-                x >= 0
-                    && y >= 0
-                    && (x as usize) < mask.width
-                    && (y as usize) < mask.height
-                    && mask.data[y as usize * mask.width + x as usize] == HAND_CLASS
-            })
-        })
-    }
-
-    fn is_hand(&self, u: f64, v: f64) -> bool {
-        self.is_masked(u, v)
-            || self.bones.iter().any(|(a, b, wide)| {
-                let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
-                let length = dx * dx + dy * dy;
-                let along = if length > 0.0 { ((u - a[0]) * dx + (v - a[1]) * dy) / length } else { 0.0 };
-                let s = along.clamp(0.0, 1.0);
-                (u - a[0] - s * dx).hypot(v - a[1] - s * dy) < *wide
-            })
-    }
-
-    /// Distance to the nearest surface that is not a hand, at most [`REACH_M`]; `None` where the place is not in view.
-    fn nearest_m(&self, place: &Point) -> Option<f64> {
-        /// Surfaces are sampled this finely, metres.
-        const STEP_M: f64 = 0.012;
-        let camera = &self.recording.camera;
-        let local = self.frame.world_from_camera.inverse() * place;
-        let (u, v) = camera.project(&local).filter(|(u, v)| camera.contains(*u, *v))?;
-        let pixels_per_m = camera.fx / local.z;
-        let step = ((STEP_M * pixels_per_m) as usize).max(1);
-        let reach = REACH_M * pixels_per_m;
-        let range = |c: f64, size: usize| {
-            let (low, high) = ((c - reach).max(0.0) as usize, (c + reach).max(0.0) as usize);
-            (low / step * step..(high + 1).min(size)).step_by(step)
-        };
-        let mut best = REACH_M;
-        for y in range(v, self.depth.height) {
-            for x in range(u, self.depth.width) {
-                let z = f64::from(self.depth.data[y * self.depth.width + x]);
-                if z <= 0.0 || (z - local.z).abs() >= best {
-                    continue;
-                }
-                let distance = (camera.unproject(x as f64, y as f64, z) - local).norm();
-                if distance < best && !self.is_hand(x as f64, y as f64) {
-                    best = distance;
-                }
-            }
-        }
-        Some(best)
-    }
 }
 
 #[cfg(test)]
@@ -489,6 +417,10 @@ mod tests {
             side: Side::Right,
             frames: (100..100 + n).collect(),
             times: (0..n).map(|i| i as f64 / 12.0).collect(),
+            places: vec![Point::origin(); n],
+            rests: vec![[0.0; 2]; n],
+            on_path: None,
+            stretches: vec![0; n],
             now: (0..n).map(|i| Some(distance(i))).collect(),
             before: (0..n).map(|i| (i < 12).then_some(distance(i))).collect(),
             after: (0..n).map(|i| (i > 24).then_some(distance(i))).collect(),

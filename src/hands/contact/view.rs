@@ -1,0 +1,116 @@
+//! What a frame's depth shows around a place, without hands.
+
+use super::REACH_M;
+use crate::error::Result;
+use crate::math::Point;
+use crate::recording::{Frame, Grid, HAND_CLASS, HandSample, Recording};
+
+/// A frame's depth without hands.
+pub(super) struct View<'a> {
+    recording: &'a Recording,
+    frame: &'a Frame,
+    depth: Grid<f32>,
+    mask: Option<Grid<u8>>,
+    /// Bones of the hands that the mask misses, in pixels: ends and half width.
+    bones: Vec<([f64; 2], [f64; 2], f64)>,
+    /// Pixels by which masks are taken to be off at a hand's rim.
+    rim: isize,
+}
+
+impl<'a> View<'a> {
+    /// `None` where the frame has no depth of its own.
+    pub(super) fn of(recording: &'a Recording, index: usize) -> Result<Option<Self>> {
+        let Some(frame) = recording.frames.get(index).filter(|f| f.files.depth.is_some()) else { return Ok(None) };
+        let Some(depth) = recording.depth(index)? else { return Ok(None) };
+        let mask = recording.mask(index)?;
+        // Four pixels of 640: what segmenters smear.
+        let rim = ((recording.camera.width as f64 / 160.0).round() as isize).max(1);
+        let mut view = Self { recording, frame, depth, mask, bones: Vec::new(), rim };
+        for hand in recording.hands_in(index, index) {
+            view.bones.extend(view.missed_bones(hand));
+        }
+        Ok(Some(view))
+    }
+
+    /// A hand's bones where the mask does not show the hand.
+    fn missed_bones(&self, hand: &HandSample) -> Vec<([f64; 2], [f64; 2], f64)> {
+        /// Half of a finger's breadth and what a tracked hand is off sideways, metres.
+        const HALF_WIDTH_M: f64 = 0.03;
+        let camera_from_world = self.frame.world_from_camera.inverse();
+        let camera = &self.recording.camera;
+        let on_image = |p: &Point| {
+            let local = camera_from_world * p;
+            camera.project(&local).map(|(u, v)| ([u, v], HALF_WIDTH_M * camera.fx / local.z))
+        };
+        let points = hand.skeleton();
+        let seen: Vec<[f64; 2]> = points.iter().filter_map(|p| on_image(p).map(|(uv, _)| uv)).collect();
+        let masked = seen.iter().filter(|uv| self.is_masked(uv[0], uv[1])).count();
+        if seen.is_empty() || 3 * masked > seen.len() {
+            return Vec::new();
+        }
+        let bones = hand.bones();
+        bones
+            .iter()
+            .filter_map(|[a, b]| {
+                let ((a, wide), (b, _)) = (on_image(a)?, on_image(b)?);
+                Some((a, b, wide))
+            })
+            .collect()
+    }
+
+    fn is_masked(&self, u: f64, v: f64) -> bool {
+        let Some(mask) = &self.mask else { return false };
+        let (u, v) = (u.round() as isize, v.round() as isize);
+        [-self.rim, 0, self.rim].iter().any(|dv| {
+            [-self.rim, 0, self.rim].iter().any(|du| {
+                let (x, y) = (u + du, v + dv);
+                x >= 0
+                    && y >= 0
+                    && (x as usize) < mask.width
+                    && (y as usize) < mask.height
+                    && mask.data[y as usize * mask.width + x as usize] == HAND_CLASS
+            })
+        })
+    }
+
+    fn is_hand(&self, u: f64, v: f64) -> bool {
+        self.is_masked(u, v)
+            || self.bones.iter().any(|(a, b, wide)| {
+                let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+                let length = dx * dx + dy * dy;
+                let along = if length > 0.0 { ((u - a[0]) * dx + (v - a[1]) * dy) / length } else { 0.0 };
+                let s = along.clamp(0.0, 1.0);
+                (u - a[0] - s * dx).hypot(v - a[1] - s * dy) < *wide
+            })
+    }
+
+    /// Distance to the nearest surface that is not a hand, at most [`REACH_M`]; `None` where the place is not in view.
+    pub(super) fn nearest_m(&self, place: &Point) -> Option<f64> {
+        /// Surfaces are sampled this finely, metres.
+        const STEP_M: f64 = 0.012;
+        let camera = &self.recording.camera;
+        let local = self.frame.world_from_camera.inverse() * place;
+        let (u, v) = camera.project(&local).filter(|(u, v)| camera.contains(*u, *v))?;
+        let pixels_per_m = camera.fx / local.z;
+        let step = ((STEP_M * pixels_per_m) as usize).max(1);
+        let reach = REACH_M * pixels_per_m;
+        let range = |c: f64, size: usize| {
+            let (low, high) = ((c - reach).max(0.0) as usize, (c + reach).max(0.0) as usize);
+            (low / step * step..(high + 1).min(size)).step_by(step)
+        };
+        let mut best = REACH_M;
+        for y in range(v, self.depth.height) {
+            for x in range(u, self.depth.width) {
+                let z = f64::from(self.depth.data[y * self.depth.width + x]);
+                if z <= 0.0 || (z - local.z).abs() >= best {
+                    continue;
+                }
+                let distance = (camera.unproject(x as f64, y as f64, z) - local).norm();
+                if distance < best && !self.is_hand(x as f64, y as f64) {
+                    best = distance;
+                }
+            }
+        }
+        Some(best)
+    }
+}
