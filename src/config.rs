@@ -336,7 +336,7 @@ block! {
         /// Pieces of surface that hang together with nothing and are smaller are noise: a hand's breadth by two.
         shard_m2: f64 = 0.02, "m^2", "ours";
         /// Triangles of the room.
-        triangles: usize = 200_000, "triangles", "ours";
+        triangles: usize = 80_000, "triangles", "ours";
         /// Edge of a texel: a pixel of a VGA camera at a metre and a half. It grows where `texels` would not suffice.
         texel_m: f64 = 0.004, "m", "ours";
         /// Texels of all surfaces together: half of a page of 4096 x 4096.

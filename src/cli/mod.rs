@@ -45,6 +45,7 @@ use clap::{Args, Parser, Subcommand};
 
 pub use self::calls::{Called, Listener, call};
 use crate::config::Config;
+use crate::hands::find;
 use crate::recording::Recording;
 
 /// What a command answers, as an exit code: 0 done, 1 ran but the answer is no, 2 error.
@@ -154,6 +155,15 @@ impl Opening {
         }
         Ok(recording)
     }
+}
+
+/// The recording with the interactions that are found in it, where nobody said when they are.
+fn with_clips(mut recording: Recording, dir: &Path) -> crate::error::Result<Recording> {
+    if recording.clips.is_empty() {
+        recording.clips = find::interactions(&recording, &crate::config::Hands::default())?;
+        eprintln!("{}: no clips.json: found {} interactions by the hands", shown(dir), recording.clips.len());
+    }
+    Ok(recording)
 }
 
 /// Runs the command line of this process.

@@ -163,7 +163,7 @@ impl Facts {
 
 /// Whether a folder is a recording of ours.
 fn is_recording(path: &Path) -> bool {
-    ["cameras.json", "clips.json"].iter().all(|name| path.join(name).is_file())
+    path.join("cameras.json").is_file()
 }
 
 pub fn run(args: &PerceiveArgs) -> anyhow::Result<Answer> {

@@ -1,6 +1,7 @@
 //! Dynamic interaction: fingertips to a contact-trimmed, smoothed trajectory (§3.1, §A.2).
 
 pub mod contact;
+pub mod find;
 
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};

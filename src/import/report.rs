@@ -146,12 +146,12 @@ pub(super) const NEEDED: [(&str, &str, &str); 6] = [
     ),
     (
         "contact",
-        "nobody says when a hand holds something: all samples of a clip count",
+        "when a hand holds something is told from depth around it; a detector adds evidence",
         "run a contact detector on the source's own images and import its output too",
     ),
     (
         "clips",
-        "which part is moved when",
+        "interactions are found by the hands; narrations add names",
         "import narrations too (SRT, or CSV with start, end, narration), or write clips.json: \
          {\"clips\": [{\"clip\", \"start_frame\", \"end_frame\", \"narration\"}]}",
     ),

@@ -35,7 +35,11 @@ struct JointEntry<'a> {
 #[derive(Debug, Serialize)]
 struct ClipEntry<'a> {
     clip: &'a str,
+    /// First and last frame.
+    frames: [usize; 2],
     narration: &'a str,
+    #[serde(skip_serializing_if = "str::is_empty")]
+    verb: &'a str,
     joint_of_scene: Option<&'a str>,
     outcome: &'a Outcome<ClipJoint>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -97,7 +101,9 @@ pub fn articulations(scene: &Scene, reasoner: &str) -> crate::error::Result<Stri
             .iter()
             .map(|c| ClipEntry {
                 clip: &c.clip.clip,
+                frames: [c.clip.start_frame, c.clip.end_frame],
                 narration: &c.clip.narration,
+                verb: &c.clip.verb,
                 joint_of_scene: scene.joint_of(&c.clip.clip).map(|j| j.id.as_str()),
                 outcome: &c.joint,
                 words: c.words.as_ref(),

@@ -6,8 +6,8 @@
 //! is from the fingertips, how much that varies, how much hands tremble and how often flags are right is measured in each
 //! recording.
 
-mod motion;
-mod view;
+pub(super) mod motion;
+pub(super) mod view;
 
 use rayon::prelude::*;
 
@@ -225,7 +225,7 @@ fn still_frames(recording: &Recording, clip: &Clip, at_work: &AtWork) -> Vec<(us
 }
 
 /// Values at times where they are known, linear in between where the gap is no longer than `gap_secs`.
-fn between(times: &[f64], known: &[Option<f64>], gap_secs: f64) -> Vec<Option<f64>> {
+pub(super) fn between(times: &[f64], known: &[Option<f64>], gap_secs: f64) -> Vec<Option<f64>> {
     let mut all = known.to_vec();
     let mut last: Option<(usize, f64)> = None;
     for (i, value) in known.iter().enumerate() {
@@ -245,15 +245,15 @@ fn between(times: &[f64], known: &[Option<f64>], gap_secs: f64) -> Vec<Option<f6
 
 /// How far the held surface is from the fingertips.
 #[derive(Debug, Clone, PartialEq)]
-struct Widths {
+pub(super) struct Widths {
     /// Over all clips, metres.
-    mean: f64,
+    pub(super) mean: f64,
     /// From sample to sample.
-    std: f64,
+    pub(super) std: f64,
     /// From clip to clip: hands keep an error for a whole clip.
-    between: f64,
+    pub(super) between: f64,
     /// Each clip's own mean, drawn towards that of all as far as it rests on few samples.
-    by_clip: Vec<Option<f64>>,
+    pub(super) by_clip: Vec<Option<f64>>,
 }
 
 impl Default for Widths {
@@ -297,7 +297,7 @@ impl Widths {
     }
 
     /// Log odds of contact for a distance to a surface in a clip.
-    fn nats(&self, clip: usize, distance_m: Option<f64>) -> f64 {
+    pub(super) fn nats(&self, clip: usize, distance_m: Option<f64>) -> f64 {
         let Some(d) = distance_m else { return 0.0 };
         let (mean, std) = match self.by_clip.get(clip).copied().flatten() {
             // A third wider: the middle of a hold is steadier than its ends.
@@ -395,7 +395,7 @@ fn best_span(index: usize, track: &Track, clip: usize, widths: &Widths, flags: &
 }
 
 /// Log likelihood of how long a hold lasts, against the most likely one.
-fn lasts(secs: f64) -> f64 {
+pub(super) fn lasts(secs: f64) -> f64 {
     // A frame is not less than a twentieth of a second.
     -0.5 * ((secs.max(0.05) / HOLD_SECS).ln() / HOLD_LOG_STD).powi(2)
 }

@@ -27,7 +27,7 @@ const RADII_M: [f64; 2] = [0.08, 3.0];
 const MAD: f64 = 1.4826;
 
 /// Standard deviation of a hand's position from sample to sample, metres, over all tracks; each as times and places.
-pub(super) fn tremble_m<'a>(tracks: impl Iterator<Item = (&'a [f64], &'a [Point])>) -> f64 {
+pub(crate) fn tremble_m<'a>(tracks: impl Iterator<Item = (&'a [f64], &'a [Point])>) -> f64 {
     let mut steps = Vec::new();
     for (times, places) in tracks {
         for i in 1..places.len().saturating_sub(1) {
@@ -41,7 +41,7 @@ pub(super) fn tremble_m<'a>(tracks: impl Iterator<Item = (&'a [f64], &'a [Point]
 }
 
 /// Log odds of each sample for being the first of a hold (rests after it) and the last (rested before it).
-pub(super) fn rests(times: &[f64], places: &[Point], tremble_m: f64) -> Vec<[f64; 2]> {
+pub(crate) fn rests(times: &[f64], places: &[Point], tremble_m: f64) -> Vec<[f64; 2]> {
     // The rest itself is short, and a hand gives way a little.
     let std = 1.3 * tremble_m + 0.01;
     let nats = |i: usize, near: &dyn Fn(f64) -> bool| {
@@ -62,30 +62,59 @@ pub(super) fn rests(times: &[f64], places: &[Point], tremble_m: f64) -> Vec<[f64
 
 /// Log odds of contact for each sample by its distance to the line or arc that the samples `first..=last` show; `None` where
 /// they show none.
-pub(super) fn on_path(places: &[Point], first: usize, last: usize, tremble_m: f64) -> Option<Vec<f64>> {
+pub(crate) fn on_path(places: &[Point], first: usize, last: usize, tremble_m: f64) -> Option<Vec<f64>> {
     let count = last + 1 - first;
     if count < LEAST_SAMPLES {
         return None;
     }
+    let (shape, typical) = shape(&places[first..=last])?;
+    let std = (MAD * typical).max(tremble_m + 0.01);
+    Some(places.iter().map(|p| log_odds(shape.distance(p), std, BESIDE_M)).collect())
+}
+
+/// The line or arc of a hold, and how far its samples are typically from it, metres.
+fn shape(places: &[Point]) -> Option<(Shape, f64)> {
     // Ends may be part of reaching or withdrawing.
-    let core = &places[first + count / 6..=last - count / 6];
+    let core = &places[places.len() / 6..places.len() - places.len() / 6];
     // An arc has one more freedom than a line, and has to be better by as much.
     let fits = [(Shape::line(core), 1.0), (Shape::arc(core), 1.25)];
-    let (shape, typical) = fits
-        .into_iter()
+    fits.into_iter()
         .filter_map(|(shape, handicap)| {
             let shape = shape?;
             let typical = stats::median(&core.iter().map(|p| shape.distance(p)).collect::<Vec<_>>())?;
             Some((shape, typical, handicap * typical))
         })
         .min_by(|a, b| a.2.total_cmp(&b.2))
-        .map(|(shape, typical, _)| (shape, typical))?;
-    let std = (MAD * typical).max(tremble_m + 0.01);
-    Some(places.iter().map(|p| log_odds(shape.distance(p), std, BESIDE_M)).collect())
+        .map(|(shape, typical, _)| (shape, typical))
+}
+
+/// What all samples of a hold say by how near they are to one line or arc. The width is what hands tremble, not what the samples
+/// show: a hand that wanders would widen it.
+pub(crate) fn path_nats(places: &[Point], tremble_m: f64) -> f64 {
+    /// One sample says no more against it, nats.
+    const AT_LEAST: f64 = -3.0;
+    if places.len() < LEAST_SAMPLES {
+        return 0.0;
+    }
+    let Some((shape, _)) = shape(places) else { return 0.0 };
+    let std = tremble_m + 0.015;
+    places.iter().map(|p| log_odds(shape.distance(p), std, BESIDE_M).max(AT_LEAST)).sum()
+}
+
+/// Places with what is around them in time: the median over a third of a second.
+pub(crate) fn calmed(times: &[f64], places: &[Point]) -> Vec<Point> {
+    const HALF_SECS: f64 = 0.18;
+    (0..places.len())
+        .map(|i| {
+            let from = times.partition_point(|t| *t < times[i] - HALF_SECS);
+            let to = times.partition_point(|t| *t <= times[i] + HALF_SECS);
+            middle(&places[from..to]).unwrap_or(places[i])
+        })
+        .collect()
 }
 
 /// For each sample the number of its stretch: between two stretches the hand would have been faster than hands are.
-pub(super) fn stretches(times: &[f64], places: &[Point]) -> Vec<usize> {
+pub(crate) fn stretches(times: &[f64], places: &[Point]) -> Vec<usize> {
     let mut number = 0;
     (0..places.len())
         .map(|i| {
@@ -94,7 +123,10 @@ pub(super) fn stretches(times: &[f64], places: &[Point]) -> Vec<usize> {
                 let before = middle(&places[i.saturating_sub(3)..i]);
                 let after = middle(&places[i..places.len().min(i + 3)]);
                 let jump = before.zip(after).map_or(0.0, |(a, b)| (a - b).norm());
-                number += usize::from(jump > JUMP_M + FASTEST_M_PER_S * (times[i] - times[i - 1]));
+                let limit = JUMP_M + FASTEST_M_PER_S * (times[i] - times[i - 1]);
+                // Just between these two, not next to it.
+                let here = (places[i] - places[i - 1]).norm() > limit;
+                number += usize::from(here && jump > limit);
             }
             number
         })

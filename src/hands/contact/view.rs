@@ -6,7 +6,7 @@ use crate::math::Point;
 use crate::recording::{Frame, Grid, HAND_CLASS, HandSample, Recording};
 
 /// A frame's depth without hands.
-pub(super) struct View<'a> {
+pub(crate) struct View<'a> {
     recording: &'a Recording,
     frame: &'a Frame,
     depth: Grid<f32>,
@@ -19,7 +19,7 @@ pub(super) struct View<'a> {
 
 impl<'a> View<'a> {
     /// `None` where the frame has no depth of its own.
-    pub(super) fn of(recording: &'a Recording, index: usize) -> Result<Option<Self>> {
+    pub(crate) fn of(recording: &'a Recording, index: usize) -> Result<Option<Self>> {
         let Some(frame) = recording.frames.get(index).filter(|f| f.files.depth.is_some()) else { return Ok(None) };
         let Some(depth) = recording.depth(index)? else { return Ok(None) };
         let mask = recording.mask(index)?;
@@ -85,7 +85,7 @@ impl<'a> View<'a> {
     }
 
     /// Distance to the nearest surface that is not a hand, at most [`REACH_M`]; `None` where the place is not in view.
-    pub(super) fn nearest_m(&self, place: &Point) -> Option<f64> {
+    pub(crate) fn nearest_m(&self, place: &Point) -> Option<f64> {
         /// Surfaces are sampled this finely, metres.
         const STEP_M: f64 = 0.012;
         let camera = &self.recording.camera;
@@ -112,5 +112,37 @@ impl<'a> View<'a> {
             }
         }
         Some(best)
+    }
+
+    /// Depth of this view's surfaces around a place as the other view sees it there, and as it has to be there, metres along the
+    /// other's axis. Without hands, and without what the other view does not show.
+    pub(crate) fn depth_against(&self, other: &View, place: &Point, reach_m: f64) -> Vec<(f64, f64)> {
+        /// Surfaces are sampled this finely, metres.
+        const STEP_M: f64 = 0.03;
+        let camera = &self.recording.camera;
+        let local = self.frame.world_from_camera.inverse() * place;
+        if local.z < 0.1 {
+            return Vec::new();
+        }
+        let step = ((STEP_M * camera.fx / local.z) as usize).max(1);
+        let other_from_own = other.frame.world_from_camera.inverse() * self.frame.world_from_camera;
+        let mut pairs = Vec::new();
+        for y in (0..self.depth.height).step_by(step) {
+            for x in (0..self.depth.width).step_by(step) {
+                let z = f64::from(self.depth.data[y * self.depth.width + x]);
+                if z <= 0.0 {
+                    continue;
+                }
+                let point = camera.unproject(x as f64, y as f64, z);
+                if (point - local).norm() > reach_m || self.is_hand(x as f64, y as f64) {
+                    continue;
+                }
+                let there = other_from_own * point;
+                let pixel = camera.project(&there).filter(|(u, v)| camera.contains(*u, *v));
+                let Some((u, v)) = pixel.filter(|(u, v)| !other.is_hand(*u, *v)) else { continue };
+                pairs.extend(other.depth.nearest(u, v).filter(|z| *z > 0.0).map(|z| (f64::from(z), there.z)));
+            }
+        }
+        pairs
     }
 }
