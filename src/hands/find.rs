@@ -29,7 +29,7 @@ const HANDS_AWAY_M: f64 = 0.35;
 /// An interaction needs this much evidence, nats: odds of fifty to one.
 const ENOUGH_NATS: f64 = 4.0;
 /// Ends at which a hand surely does not rest are not tried, nats.
-const UNREST_NATS: f64 = -0.5;
+const UNREST_NATS: f64 = -2.0;
 /// Fingertips are about this far from what they hold, and it varies by so much, metres: estimated hands, estimated depth.
 const HELD_AT_M: f64 = 0.05;
 const HELD_STD_M: f64 = 0.04;
@@ -212,7 +212,7 @@ impl Walk {
                     let moved = (calm[j] - calm[i]).norm();
                     farthest = farthest.max(moved);
                     // The way there, not there and back: that is two interactions.
-                    if rests[j][1] < UNREST_NATS || moved < least || moved < 0.8 * farthest {
+                    if rests[j][1] < UNREST_NATS || moved < least || moved < 0.65 * farthest {
                         continue;
                     }
                     let nats = begin + sums[j + 1] + widths.nats(0, self.after[j]) + rests[j][1] + lasts(secs);
