@@ -15,9 +15,9 @@ use super::mesh::Mesh;
 const CUBE_M: f32 = 1.0;
 /// The cubes leave this many times the budget: the rims that they share are worked on afterwards.
 const ROUGH: f64 = 2.5;
-/// Of the edges of a pass this share may go.
+/// Of the edges of a pass this share may go; twice as many after a pass that was stuck, as the cheapest may all have to stay.
 const SHARE: f64 = 0.25;
-/// A pass that takes fewer of a hundred triangles than this ends the work.
+/// A pass that takes fewer of a hundred triangles than this is stuck; one that may take any edge ends the work.
 const LEAST_PERCENT: usize = 1;
 /// Passes at the most: each takes about an eighth.
 const PASSES: usize = 80;
@@ -164,15 +164,18 @@ fn passes(mesh: Mesh, fast: &[bool], budget: usize) -> Mesh {
         triangles: mesh.triangles,
     };
     work.quadrics = work.planes();
+    let mut share = SHARE;
     for _ in 0..PASSES {
         let before = work.triangles.len();
         if before <= budget {
             break;
         }
-        work.pass(fast, budget);
-        if (before - work.triangles.len()) * 100 < before * LEAST_PERCENT {
+        work.pass(fast, budget, share);
+        let stuck = (before - work.triangles.len()) * 100 < before * LEAST_PERCENT;
+        if stuck && share >= 1.0 {
             break;
         }
+        share = if stuck { (2.0 * share).min(1.0) } else { SHARE };
     }
     Mesh {
         positions: work.positions.iter().map(|p: &Vector3<f64>| p.map(|c| c as f32) + middle).collect(),
@@ -330,7 +333,7 @@ impl Work {
         Some((place, sum.error(&place) + 1e-9 * (pa - pb).norm_squared()))
     }
 
-    fn pass(&mut self, fast: &[bool], budget: usize) {
+    fn pass(&mut self, fast: &[bool], budget: usize, share: f64) {
         let rings = Rings::of(&self.triangles, self.positions.len());
         let rims: Vec<Rim> = (0..self.positions.len() as u32).into_par_iter().map(|v| self.rim(&rings, v)).collect();
         // Each edge once: an inner one is met in both senses.
@@ -345,7 +348,7 @@ impl Work {
             return;
         }
         let mut errors: Vec<f32> = edges.iter().map(|(_, e)| *e).collect();
-        let rank = ((errors.len() as f64 * SHARE) as usize).min(errors.len() - 1);
+        let rank = ((errors.len() as f64 * share) as usize).min(errors.len() - 1);
         let limit = *errors.select_nth_unstable_by(rank, f32::total_cmp).1;
         // A triangle that is as it was has its corners where they were.
         let mut touched = vec![false; self.triangles.len()];

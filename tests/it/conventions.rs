@@ -155,7 +155,8 @@ fn every_wrong_convention_is_named() {
 fn hands_are_judged_by_what_they_hide_where_no_mask_shows_them() {
     const LATE: [Tier; 3] = [Tier::Clean, Tier::T1, Tier::T2];
     const MIRRORED: [Tier; 4] = [Tier::Clean, Tier::T1, Tier::T2, Tier::Hd];
-    let wrong: [(&[Tier], fn(&mut Recording), &str); 2] = [
+    type Damage = fn(&mut Recording);
+    let wrong: [(&[Tier], Damage, &str); 2] = [
         (&LATE, |r| shift_hands(r, 10), "the hands come 0.83 s (10 frames) too late"),
         (&MIRRORED, mirror_hands, "mirrored in the camera's x"),
     ];

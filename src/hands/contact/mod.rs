@@ -379,13 +379,13 @@ fn best_span(index: usize, track: &Track, clip: usize, widths: &Widths, flags: &
     let ends: Vec<f64> =
         (0..track.frames.len()).map(|j| sums[j + 1] + widths.nats(clip, track.after[j]) + track.rests[j][1]).collect();
     let mut best: Option<Span> = None;
-    for first in 0..=track.starts_by {
-        let begin = widths.nats(clip, track.before[first]) + track.rests[first][0] - sums[first];
-        for last in first.max(track.ends_from)..track.frames.len() {
+    for (first, sum) in sums.iter().enumerate().take(track.starts_by + 1) {
+        let begin = widths.nats(clip, track.before[first]) + track.rests[first][0] - sum;
+        for (last, end) in ends.iter().enumerate().skip(first.max(track.ends_from)) {
             if track.stretches[last] != track.stretches[first] {
                 break;
             }
-            let nats = begin + ends[last] + lasts(track.times[last] - track.times[first]);
+            let nats = begin + end + lasts(track.times[last] - track.times[first]);
             if nats > 0.0 && best.is_none_or(|b| nats > b.nats) {
                 best = Some(Span { track: index, first, last, nats });
             }

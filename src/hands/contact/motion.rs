@@ -54,7 +54,7 @@ pub(crate) fn rests(times: &[f64], places: &[Point], tremble_m: f64) -> Vec<[f64
     (0..times.len())
         .map(|i| {
             let after = nats(i, &|dt| dt > 0.0 && dt <= REST_SECS + 0.02);
-            let before = nats(i, &|dt| dt < 0.0 && dt >= -REST_SECS - 0.02);
+            let before = nats(i, &|dt| (-REST_SECS - 0.02..0.0).contains(&dt));
             [after.unwrap_or(0.0), before.unwrap_or(0.0)]
         })
         .collect()
