@@ -53,7 +53,7 @@ impl Door {
             found = findings(&Subject::of(&recording));
         }
         self.judged(dir, &found, refused)?;
-        Ok(super::with_clips(recording, dir)?)
+        Ok(super::with_clips(recording, dir))
     }
 
     /// Says what was found; an error where it is certain and leaves nothing to infer.

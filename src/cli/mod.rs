@@ -158,12 +158,12 @@ impl Opening {
 }
 
 /// The recording with the interactions that are found in it, where nobody said when they are.
-fn with_clips(mut recording: Recording, dir: &Path) -> crate::error::Result<Recording> {
+fn with_clips(mut recording: Recording, dir: &Path) -> Recording {
     if recording.clips.is_empty() {
-        recording.clips = find::interactions(&recording, &crate::config::Hands::default())?;
+        recording.clips = find::interactions(&recording, &crate::config::Hands::default());
         eprintln!("{}: no clips.json: found {} interactions by the hands", shown(dir), recording.clips.len());
     }
-    Ok(recording)
+    recording
 }
 
 /// Runs the command line of this process.

@@ -7,7 +7,6 @@ use super::contact::motion;
 use super::contact::view::View;
 use super::contact::{Widths, between, lasts};
 use crate::config;
-use crate::error::Result;
 use crate::math::{Point, stats};
 use crate::recording::{Clip, Recording, Side};
 
@@ -40,14 +39,13 @@ const SHARED: f64 = 0.25;
 
 /// Clips of all interactions that open or close something, in time order; of words they have "open" and "close" at most, where
 /// one takes back what another did.
-///
-/// # Errors
-/// Images that cannot be decoded.
-pub fn interactions(recording: &Recording, config: &config::Hands) -> Result<Vec<Clip>> {
+/// A frame that cannot be decoded tells nothing here; the pipeline names it.
+#[must_use]
+pub fn interactions(recording: &Recording, config: &config::Hands) -> Vec<Clip> {
     let mut walks: Vec<Walk> = [Side::Right, Side::Left].iter().map(|side| Walk::of(recording, *side)).collect();
     let tremble = motion::tremble_m(walks.iter().map(|w| (w.times.as_slice(), w.places.as_slice())));
-    distances_now(recording, &mut walks, config)?;
-    distances_still(recording, &mut walks)?;
+    distances_now(recording, &mut walks, config);
+    distances_still(recording, &mut walks);
     let mut candidates: Vec<Candidate> =
         walks.iter().enumerate().flat_map(|(w, walk)| walk.candidates(w, tremble)).collect();
     candidates
@@ -63,12 +61,11 @@ pub fn interactions(recording: &Recording, config: &config::Hands) -> Result<Vec
             chosen.push(candidate);
         }
     }
-    let changed: Vec<bool> =
-        chosen.par_iter().map(|c| something_changed(recording, &walks, c)).collect::<Result<_>>()?;
+    let changed: Vec<bool> = chosen.par_iter().map(|c| something_changed(recording, &walks, c)).collect();
     let mut moves: Vec<Move> =
         chosen.iter().zip(changed).filter(|(_, changed)| *changed).map(|(c, _)| walks[c.walk].moved(c)).collect();
     moves.sort_by_key(|m| m.frames);
-    Ok(clips(recording, &moves))
+    clips(recording, &moves)
 }
 
 /// A found interaction.
@@ -232,7 +229,7 @@ impl Walk {
 }
 
 /// Distances in the frames with hands, every so often; in between they are interpolated.
-fn distances_now(recording: &Recording, walks: &mut [Walk], config: &config::Hands) -> Result<()> {
+fn distances_now(recording: &Recording, walks: &mut [Walk], config: &config::Hands) {
     let mut frames: Vec<usize> = walks.iter().flat_map(|w| w.frames.iter().copied()).collect();
     frames.sort_unstable();
     frames.dedup();
@@ -240,14 +237,14 @@ fn distances_now(recording: &Recording, walks: &mut [Walk], config: &config::Han
     let seen: Vec<Vec<Option<f64>>> = frames
         .par_iter()
         .map(|&frame| {
-            let view = View::of(recording, frame)?;
+            let view = view(recording, frame);
             let distance = |walk: &Walk| {
                 let at = walk.frames.binary_search(&frame).ok()?;
                 view.as_ref()?.nearest_m(&walk.places[at])
             };
-            Ok(walks.iter().map(distance).collect())
+            walks.iter().map(distance).collect()
         })
-        .collect::<Result<_>>()?;
+        .collect();
     for (w, walk) in walks.iter_mut().enumerate() {
         for (&frame, seen) in frames.iter().zip(&seen) {
             if let Ok(at) = walk.frames.binary_search(&frame) {
@@ -256,11 +253,10 @@ fn distances_now(recording: &Recording, walks: &mut [Walk], config: &config::Han
         }
         walk.now = between(&walk.times, &walk.now, 2.5 * config.contact_every_secs);
     }
-    Ok(())
 }
 
 /// Distances to what stood at each sample's place before the hand came and after it left: each view is decoded once.
-fn distances_still(recording: &Recording, walks: &mut [Walk]) -> Result<()> {
+fn distances_still(recording: &Recording, walks: &mut [Walk]) {
     let views = spaced(recording, with_depth(recording), VIEW_SECS);
     // View, walk, sample, before or after.
     let mut asked: Vec<(usize, usize, usize, bool)> = Vec::new();
@@ -277,10 +273,10 @@ fn distances_still(recording: &Recording, walks: &mut [Walk]) -> Result<()> {
     let answers: Vec<Vec<Option<f64>>> = groups
         .par_iter()
         .map(|group| {
-            let view = View::of(recording, group[0].0)?;
-            Ok(group.iter().map(|(_, w, i, _)| view.as_ref()?.nearest_m(&walks[*w].places[*i])).collect())
+            let view = view(recording, group[0].0);
+            group.iter().map(|(_, w, i, _)| view.as_ref()?.nearest_m(&walks[*w].places[*i])).collect()
         })
-        .collect::<Result<_>>()?;
+        .collect();
     let mut sums: Vec<Vec<[(f64, f64); 2]>> = walks.iter().map(|w| vec![[(0.0, 0.0); 2]; w.frames.len()]).collect();
     for (group, answers) in groups.iter().zip(&answers) {
         for ((_, w, i, before), answer) in group.iter().zip(answers) {
@@ -295,7 +291,10 @@ fn distances_still(recording: &Recording, walks: &mut [Walk]) -> Result<()> {
         walk.before = sums.iter().map(|s| mean(s[1])).collect();
         walk.after = sums.iter().map(|s| mean(s[0])).collect();
     }
-    Ok(())
+}
+
+fn view(recording: &Recording, frame: usize) -> Option<View<'_>> {
+    View::of(recording, frame).ok().flatten()
 }
 
 fn with_depth(recording: &Recording) -> Vec<usize> {
@@ -342,7 +341,7 @@ fn still_views(recording: &Recording, views: &[usize], place: &Point, time: f64,
 }
 
 /// Whether depth around the way of a hand is another after than before; also where nobody can tell.
-fn something_changed(recording: &Recording, walks: &[Walk], candidate: &Candidate) -> Result<bool> {
+fn something_changed(recording: &Recording, walks: &[Walk], candidate: &Candidate) -> bool {
     /// Surfaces so near to the ends of the way are compared, metres, beside the way's own length.
     const AROUND_M: f64 = 0.35;
     /// They have changed where they are off by this, metres, and by four times what the frames' depth is off.
@@ -362,7 +361,7 @@ fn something_changed(recording: &Recording, walks: &[Walk], candidate: &Candidat
     let mut shares = Vec::new();
     for &x in &before {
         for &y in &after {
-            let (Some(x), Some(y)) = (View::of(recording, x)?, View::of(recording, y)?) else { continue };
+            let (Some(x), Some(y)) = (view(recording, x), view(recording, y)) else { continue };
             for (one, other) in [(&x, &y), (&y, &x)] {
                 let off = one.depth_against(other, &middle, reach);
                 // A frame's depth is off by a factor of its own.
@@ -379,7 +378,7 @@ fn something_changed(recording: &Recording, walks: &[Walk], candidate: &Candidat
             }
         }
     }
-    Ok(stats::median(&shares).is_none_or(|share| share >= CHANGED_SHARE))
+    stats::median(&shares).is_none_or(|share| share >= CHANGED_SHARE)
 }
 
 #[cfg(test)]
