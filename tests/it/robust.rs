@@ -233,16 +233,18 @@ fn hands_without_contact_flags_are_as_good() {
 fn interactions_are_found_where_nobody_told_them() {
     let dir = recording(|_| {});
     let clips = dir.path().join("rec/clips.json");
-    let told: Value = serde_json::from_str(&std::fs::read_to_string(&clips).unwrap()).unwrap();
-    let told = told["clips"].as_array().unwrap().len();
     std::fs::remove_file(&clips).unwrap();
     let out = paws(&["twin", "rec", "--no-textures", "--out", "t"], dir.path());
     assert!(matches!(out.status.code(), Some(0 | 1)), "{}", stderr(&out));
     assert!(stderr(&out).contains("interactions by the hands"), "{}", stderr(&out));
     let found: Value =
         serde_json::from_str(&std::fs::read_to_string(dir.path().join("t/articulations.json")).unwrap()).unwrap();
-    let found = found["clips"].as_array().unwrap();
-    assert!(2 * found.len() >= told && found.len() <= told, "{} of {told}: {found:?}", found.len());
+    // What is found in error has no answer; what is right opens and closes one part.
+    let answered: Vec<&Value> =
+        found["clips"].as_array().unwrap().iter().filter(|c| !c["outcome"]["found"].is_null()).collect();
+    let verbs: Vec<&str> = answered.iter().filter_map(|c| c["verb"].as_str()).collect();
+    assert_eq!(verbs, ["open", "close"], "{found}");
+    assert_eq!(found["joints"].as_array().unwrap().len(), 1, "{found}");
 }
 
 #[test]
