@@ -337,7 +337,7 @@ impl Work {
         let rings = Rings::of(&self.triangles, self.positions.len());
         let rims: Vec<Rim> = (0..self.positions.len() as u32).into_par_iter().map(|v| self.rim(&rings, v)).collect();
         // Each edge once: an inner one is met in both senses.
-        let edges: Vec<([u32; 2], f32)> = self
+        let mut edges: Vec<([u32; 2], f32)> = self
             .triangles
             .par_iter()
             .flat_map_iter(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]])
@@ -353,17 +353,23 @@ impl Work {
         // A triangle that is as it was has its corners where they were.
         let mut touched = vec![false; self.triangles.len()];
         let mut left = self.triangles.len();
-        for (edge, _) in edges.iter().filter(|(_, error)| *error <= limit) {
+        // The cheapest first: where all may go, the budget ends the pass before the dear ones.
+        edges.retain(|(_, error)| *error <= limit);
+        edges.par_sort_unstable_by(|(a, x), (b, y)| x.total_cmp(y).then(a.cmp(b)));
+        for (edge, _) in &edges {
             if left <= budget {
                 break;
             }
             let Some((place, _)) = self.goal(*edge, &rims, fast) else { continue };
-            left -= self.collapse(*edge, &place, &rings, &rims, &mut touched);
+            // A vertex that is held fast keeps its number, by which cubes find each other again.
+            let [a, b] = *edge;
+            let pair = if fast.get(b as usize).copied().unwrap_or(false) { [b, a] } else { [a, b] };
+            left -= self.collapse(pair, &place, &rings, &rims, &mut touched);
         }
         self.triangles.retain(|[a, b, c]| a != b && b != c && c != a);
     }
 
-    /// Moves both ends of an edge to one place, if nothing near it has changed in this pass and nothing tears or folds. The number
+    /// Moves both ends of an edge to one place, where the first stays, if nothing near it has changed in this pass and nothing tears or folds. The number
     /// of triangles that are gone.
     fn collapse(
         &mut self,
@@ -450,6 +456,22 @@ mod tests {
         Mesh { positions: (0..(N + 1) * (N + 1)).map(at).collect(), triangles: (0..N * N).flat_map(quad).collect() }
     }
 
+    /// Whether only the square's own four sides are open.
+    fn is_whole(mesh: &Mesh) -> bool {
+        let mut edges = std::collections::BTreeMap::<[u32; 2], i32>::new();
+        for t in &mesh.triangles {
+            for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+                *edges.entry([a.min(b), a.max(b)]).or_default() += if a < b { 1 } else { -1 };
+            }
+        }
+        // Cubes meet at a metre, half a metre from the sides.
+        let at_side = |v: u32| {
+            let p = &mesh.positions[v as usize];
+            [p.x, p.y].iter().any(|c| c.abs() < 0.02 || (c - 1.5).abs() < 0.02)
+        };
+        edges.iter().filter(|(_, sum)| **sum != 0).all(|([a, b], _)| at_side(*a) && at_side(*b))
+    }
+
     fn area(mesh: &Mesh) -> f32 {
         mesh.triangles.iter().map(|t| 0.5 * mesh.across(t).norm()).sum()
     }
@@ -457,13 +479,14 @@ mod tests {
     #[test]
     fn a_plane_stays_plane_keeps_its_edges_and_meets_the_budget() {
         let whole = plane();
-        for budget in [400, 3000] {
+        for budget in [200, 3000] {
             let few = simplify(whole.clone(), budget);
             assert!(few.triangles.len() <= budget, "{}", few.triangles.len());
             assert!(few.triangles.len() * 10 >= budget * 8, "{}", few.triangles.len());
             assert!(few.positions.iter().all(|p| (p.z - 0.3 * p.x).abs() < 1e-4));
             assert!((area(&few) / area(&whole) - 1.0).abs() < 2e-3, "{} of {}", area(&few), area(&whole));
             assert!(few.triangles.iter().all(|t| few.across(t).z > 0.0));
+            assert!(is_whole(&few), "torn between cubes");
         }
         assert_eq!(simplify(whole.clone(), 45_000), whole);
     }
