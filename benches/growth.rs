@@ -14,7 +14,7 @@ use paws_twin::geometry::segments;
 use paws_twin::pipeline;
 use paws_twin::reasoning::heuristic::Geometric;
 use paws_twin::recording::Recording;
-use paws_twin::synth::{Options, Tier};
+use paws_twin::synth::{SynthOptions, Tier};
 
 /// Seconds between the end of a round and the next one.
 const PAUSE_SECS: f64 = 0.5;
@@ -46,9 +46,9 @@ fn repeated(recording: &Recording, rounds: usize) -> Recording {
 }
 
 fn growth(c: &mut Criterion) {
-    let (_dir, short) = kitchen::recorded(&Options { seed: 1, tier: Tier::Hd, width: 160, parts: 4 });
+    let (_dir, short) = kitchen::recorded(&SynthOptions { seed: 1, tier: Tier::Hd, width: 160, parts: 4 });
     let config = Config::default();
-    let reasoner = Geometric { reasoning: config.reasoning.clone(), inference: config.inference.clone() };
+    let reasoner = Geometric::of(&config);
     let mut group = c.benchmark_group("growth");
     for rounds in [1, 2, 4] {
         let recording = repeated(&short, rounds);

@@ -1,5 +1,5 @@
 //! Readers of large files, one thread each. `cargo bench` makes its own; with `PAWS_BENCH_INPUT` set to a folder it takes the
-//! files in it (`benches/import_side_by_side.py` writes them, so that other programs read the same bytes).
+//! files in it (`benches/import_side_by_side.py --inputs DIR` writes such files, for other programs as well).
 
 #![allow(clippy::unwrap_used, missing_docs, reason = "a bench that cannot run should say so at once")]
 
@@ -11,7 +11,7 @@ use std::time::Duration;
 use criterion::{Criterion, criterion_group, criterion_main};
 use paws_twin::import::blob::Blob;
 use paws_twin::import::capture::{Depth, DepthCoding};
-use paws_twin::import::{Options, decode, formats};
+use paws_twin::import::{ImportOptions, decode, formats};
 
 /// The file or folder of a name: the one that is given, else what `make` writes.
 fn source(made: &Path, name: &str, make: impl Fn(&Path)) -> PathBuf {
@@ -100,7 +100,7 @@ fn depth(path: &Path) {
 
 fn importers(c: &mut Criterion) {
     let made = tempfile::tempdir().unwrap();
-    let options = Options::default();
+    let options = ImportOptions::default();
     let sources = [
         ("import_tum", "tum", source(made.path(), "poses.txt", trajectory)),
         ("import_colmap", "colmap", source(made.path(), "model", model)),

@@ -10,27 +10,29 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use paws_twin::config::Config;
-use paws_twin::geometry::{AxisCandidate, candidates, moved, segments, sights};
+use paws_twin::geometry::{AxisCandidate, candidates, segments};
 use paws_twin::hands;
 use paws_twin::inference;
+use paws_twin::part::likelihood::OpenDepth;
+use paws_twin::part::{likelihood, views};
 use paws_twin::pipeline;
 use paws_twin::reasoning::heuristic::Geometric;
 use paws_twin::reasoning::{Question, Reasoner};
 use paws_twin::recording::sketch::Sketch;
 use paws_twin::recording::{Recording, narration};
-use paws_twin::synth::{Options, Tier};
+use paws_twin::synth::{SynthOptions, Tier};
 
 /// From the hand and the names alone, and with the depth of the open states asked about every candidate.
 fn posterior(c: &mut Criterion) {
-    let (_dir, recording) = kitchen::recorded(&Options { seed: 1, tier: Tier::T2, width: 320, parts: 4 });
+    let (_dir, recording) = kitchen::recorded(&SynthOptions { seed: 1, tier: Tier::T2, width: 320, parts: 4 });
     let config = Config::default();
-    let reasoner = Geometric { reasoning: config.reasoning.clone(), inference: config.inference.clone() };
+    let reasoner = Geometric::of(&config);
     let scene = pipeline::infer(&recording, &config, &segments::Lsd, &reasoner, &|_, _, _| {}).unwrap();
     let recording = Recording { depth_factors: scene.depth_factors, ..recording };
     let clips: Vec<&pipeline::ClipResult> = scene.clips.iter().filter(|c| c.joint.found().is_some()).collect();
     let mut sketches = BTreeMap::new();
     for clip in &clips {
-        for open in moved::open_frames(&recording, &clip.clip, clip.trajectory.as_ref().unwrap()) {
+        for open in views::open_frames(&recording, &clip.clip, clip.trajectory.as_ref().unwrap(), &config.part) {
             let depth = recording.depth_as_read(open.frame).unwrap().unwrap();
             let mask = recording.mask(open.frame).unwrap();
             sketches.insert(open.frame, Sketch::of(open.frame, &depth, mask.as_ref()));
@@ -44,10 +46,10 @@ fn posterior(c: &mut Criterion) {
             clip.candidates.iter().map(|c| candidates::settled(c, &paths, &config.reasoning)).collect();
         let grip = trajectory.closed_grip();
         let agreement = if with_depth {
-            let open = moved::open_views(&recording, &sketches, &clip.clip, trajectory);
-            let sights = sights::Sights::of(face, clip.part.as_ref(), &open);
+            let open = views::open_views(&recording, &sketches, &clip.clip, trajectory, &config.part);
+            let depth = OpenDepth::of(face, clip.part.as_ref(), &open, &config.part);
             let grip_std_m = hands::grip_std_m(trajectory.closed_end_seen());
-            sights::agreements(&sights, candidates.iter().map(|c| &c.joint), &grip, grip_std_m)
+            likelihood::log_likelihoods(&depth, candidates.iter().map(|c| &c.joint), &grip, grip_std_m)
         } else {
             vec![0.0; candidates.len()]
         };

@@ -1,10 +1,11 @@
 """Our stages beside what people would otherwise run, on the same bytes, one core, in one session.
 
-    python3 benches/side_by_side.py PEERS [--python PYTHON] [--markdown FILE]
+    python3 benches/side_by_side.py [PEERS] [--python PYTHON] [--markdown FILE] [--only NAME]
 
 PEERS is a folder of peer benchmarks (peer_voxel.py, ...): scripts that take --dump DIR, --peer all, --cores 1 and print a
-JSON line a peer. PYTHON is an interpreter that has what they need. Prints for each stage our time, every peer's, and
-the ratios; medians of the repetitions of either side.
+JSON line a peer; where none is named PAWS_PEERS, else ../shared/peers, and without such a folder nothing is compared, which is said.
+PYTHON is an interpreter that has what they need. Prints for each stage our time, every peer's, and the ratios; medians of the
+repetitions of either side. A stage whose peers or bench fail costs itself only: it is told, and the exit code is 1.
 """
 
 import argparse
@@ -44,38 +45,75 @@ def triad_bytes_per_s(python, peers):
     return None
 
 
+def dumped(args, command, folder):
+    """Has the peers' script write the inputs of a stage."""
+    command = [args.python, *command, "--dump", folder]
+    done = subprocess.run(command, cwd=args.peers, capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"{command[1]} --dump: {done.stderr.strip()[-300:]}")
+
+
+def ours_of(root, target, inputs, name):
+    """Median seconds of our bench on these inputs, and their interval."""
+    env = dict(os.environ, PAWS_BENCH_INPUT=inputs, RAYON_NUM_THREADS="1")
+    command = ["cargo", "bench", "--bench", "stages", "--", "--exact", name]
+    done = subprocess.run(command, cwd=root, env=env, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    estimates = target / "criterion" / name / "new" / "estimates.json"
+    if done.returncode or not estimates.is_file():
+        raise RuntimeError(f"cargo bench: {done.stderr.strip()[-300:]}")
+    median = json.loads(estimates.read_text())["median"]
+    interval = [median["confidence_interval"][k] * 1e-9 for k in ("lower_bound", "upper_bound")]
+    return median["point_estimate"] * 1e-9, interval
+
+
+def peers_of(args, command):
+    """What each peer says of a stage, by its name."""
+    command = [args.python, *command, "--peer", "all", "--cores", "1"]
+    out = subprocess.run(command, cwd=args.peers, capture_output=True, text=True)
+    peers = {r["peer"]: r for r in json_lines(out.stdout) if "seconds" in r}
+    if not peers:
+        raise RuntimeError(f"no peer ran: {out.stderr.strip()[-300:]}")
+    return peers
+
+
+def measured(args, root, target, name, command, band):
+    """A stage: ours, its interval, the best library, the best by hand, the bound by bytes, all peers."""
+    with tempfile.TemporaryDirectory() as inputs:
+        dumped(args, command, os.path.join(inputs, name))
+        # The two take turns, so that both see the same machine.
+        ours, interval = ours_of(root, target, inputs, name)
+    peers = peers_of(args, command)
+    library = min((r["seconds"] for p, r in peers.items() if p not in BY_HAND), default=None)
+    by_hand = min((r["seconds"] for p, r in peers.items() if p in BY_HAND), default=None)
+    work = next(iter(peers.values())).get("bound") or {}
+    bound = work["bytes"] / band if band and "bytes" in work else None
+    print(f"{name}: ours {ours * 1e3:.2f} ms", file=sys.stderr)
+    return name, ours, interval, library, by_hand, bound, peers
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("peers", type=pathlib.Path)
+    root = pathlib.Path(__file__).resolve().parent.parent
+    usual = pathlib.Path(os.environ.get("PAWS_PEERS") or root / "../shared/peers")
+    parser.add_argument("peers", type=pathlib.Path, nargs="?", default=usual)
     parser.add_argument("--python", default=sys.executable)
     parser.add_argument("--markdown", type=pathlib.Path)
     parser.add_argument("--only", help="stages with this in their name")
     args = parser.parse_args()
-    root = pathlib.Path(__file__).resolve().parent.parent
+    if not args.peers.is_dir():
+        if args.peers != usual:
+            sys.exit(f"{args.peers}: no such folder")
+        return print(f"skipped: there is no folder of peers at {usual} (PAWS_PEERS names another)")
     target = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", root / "target"))
     stages = [s for s in STAGES if not args.only or args.only in s[0]]
     band = triad_bytes_per_s(args.python, args.peers)
-    rows = []
-    with tempfile.TemporaryDirectory() as inputs:
-        for name, command in stages:
-            subprocess.run([args.python, *command, "--dump", os.path.join(inputs, name)], cwd=args.peers, check=True, capture_output=True)
-        env = dict(os.environ, PAWS_BENCH_INPUT=inputs, RAYON_NUM_THREADS="1")
-        for name, command in stages:
-            # The two take turns, so that both see the same machine.
-            subprocess.run(["cargo", "bench", "--bench", "stages", "--", "--exact", name], cwd=root, env=env, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-            estimate = json.loads((target / "criterion" / name / "new" / "estimates.json").read_text())
-            ours = estimate["median"]["point_estimate"] * 1e-9
-            interval = [estimate["median"]["confidence_interval"][k] * 1e-9 for k in ("lower_bound", "upper_bound")]
-            out = subprocess.run([args.python, *command, "--peer", "all", "--cores", "1"], cwd=args.peers, capture_output=True, text=True)
-            peers = {r["peer"]: r for r in json_lines(out.stdout)}
-            if not peers:
-                sys.exit(f"{name}: no peer ran: {out.stderr[-400:]}")
-            library = min((r["seconds"] for p, r in peers.items() if p not in BY_HAND), default=None)
-            by_hand = min((r["seconds"] for p, r in peers.items() if p in BY_HAND), default=None)
-            work = next(iter(peers.values())).get("bound") or {}
-            bound = work["bytes"] / band if band and "bytes" in work else None
-            rows.append((name, ours, interval, library, by_hand, bound, peers))
-            print(f"{name}: ours {ours * 1e3:.2f} ms", file=sys.stderr)
+    rows, failed = [], 0
+    for name, command in stages:
+        try:
+            rows.append(measured(args, root, target, name, command, band))
+        except RuntimeError as error:
+            failed += 1
+            print(f"{name}: {error}", file=sys.stderr)
     header = ["stage", "ours, ms (95 %)", "best library / ours", "by hand (numba) / ours", "ours / bytes bound", "peers, ms"]
     table = [header, ["---"] * len(header)]
     ratio = lambda a, b: "-" if a is None or not b else f"{a / b:.1f}"
@@ -87,6 +125,7 @@ def main():
     print(text)
     if args.markdown:
         args.markdown.write_text(text)
+    sys.exit(1 if failed else 0)
 
 
 if __name__ == "__main__":

@@ -4,18 +4,25 @@
 #![allow(clippy::unwrap_used, missing_docs, reason = "a bench that cannot run should say so at once")]
 
 use std::hint::black_box;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use paws_twin::articulation::{Action, Articulation, JointKind};
 use paws_twin::config::{self, Config};
+use paws_twin::geometry::segments::Lsd;
 use paws_twin::geometry::{AxisCandidate, AxisSource, detector, manhattan, segments};
 use paws_twin::hands::{self, Trajectory};
 use paws_twin::inference;
 use paws_twin::localization::{Region, views, voxels};
+use paws_twin::look::{Look, Texture, TexturedMesh};
 use paws_twin::math::{Point, Pose, Vector, kalman};
-use paws_twin::recording::{Camera, DepthFactors, Frame, FrameFiles, Grid, Recording};
+use paws_twin::reasoning::heuristic::Geometric;
+use paws_twin::recording::sketch::Sketch;
+use paws_twin::recording::{Camera, Frame, FrameFiles, Grid, Recording};
+use paws_twin::synth::{Recorded, SynthOptions, Tier};
+use paws_twin::twin::Twin;
+use paws_twin::{appearance, export, fitting, pipeline};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -111,15 +118,8 @@ fn view_select(c: &mut Criterion) {
             .map(|(i, world_from_camera)| Frame { timestamp_secs: i as f64, world_from_camera, files: files.clone() })
             .collect();
         let recording = Recording {
-            name: String::new(),
-            dir: Path::new("").to_owned(),
-            camera: Camera { width: 1408, height: 1408, fx: 610.0, fy: 610.0, cx: 703.5, cy: 703.5 },
             frames,
-            clips: Vec::new(),
-            hands: Vec::new(),
-            labels: Default::default(),
-            reconstruction: Vec::new(),
-            depth_factors: DepthFactors::default(),
+            ..Recording::empty(Camera { width: 1408, height: 1408, fx: 610.0, fy: 610.0, cx: 703.5, cy: 703.5 })
         };
         let idle: Vec<usize> = (0..recording.frames.len()).collect();
         let config = config::Localization { min_visible_share: 0.5, ..Default::default() };
@@ -225,7 +225,7 @@ fn normals_manhattan(c: &mut Criterion) {
             }
         };
     stage(c, "normals_manhattan", || {
-        black_box(manhattan::of_normals(black_box(&normals), &Vector::z()));
+        black_box(manhattan::of_normals(black_box(&normals), &Vector::z(), &config::RoomFrame::default()));
     });
 }
 
@@ -332,9 +332,103 @@ fn score_axes(c: &mut Criterion) {
     });
 }
 
+/// Fusing, meshing, simplifying and texturing of a rendered kitchen, its frames' decoding with it; on all threads.
+fn look(c: &mut Criterion) {
+    let dir = tempfile::tempdir().unwrap();
+    let recorded = Recorded::new(&SynthOptions { seed: 3, tier: Tier::Realistic, width: 320, parts: 2 }).unwrap();
+    let mut files: Vec<(String, Vec<u8>)> =
+        recorded.tables().unwrap().into_iter().map(|(name, text)| (name, text.into_bytes())).collect();
+    files.extend((0..recorded.frames()).flat_map(|frame| recorded.images(frame).unwrap()));
+    for (name, bytes) in files {
+        let path = dir.path().join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, bytes).unwrap();
+    }
+    let config = Config::default();
+    let recording = Recording::open(dir.path()).unwrap();
+    let reasoner = Geometric::of(&config);
+    let scene = pipeline::infer(&recording, &config, &Lsd, &reasoner, &|_, _, _| {}).unwrap();
+    let twin = fitting::fit(&scene, &recording.up(), &config.fitting, &config.priors);
+    stage(c, "look", || {
+        black_box(appearance::look(black_box(&recording), &scene, &twin, &config.appearance).unwrap());
+    });
+}
+
+/// The formats of a look of 80,000 triangles and 4 million texels.
+fn encode(c: &mut Criterion) {
+    let mut rng = Pcg64Mcg::seed_from_u64(8);
+    let side = 200u32;
+    let across = side + 1;
+    let at = |i: u32| [f64::from(i % across), f64::from(i / across)].map(|c| 0.03 * c);
+    let mesh = TexturedMesh {
+        positions: (0..across * across)
+            .map(|i| Point::new(at(i)[0], at(i)[1], rng.random_range(-0.01..0.01)))
+            .collect(),
+        normals: (0..across * across).map(|_| Vector::z()).collect(),
+        uv: (0..across * across).map(|i| at(i).map(|c| (c / 6.0) as f32)).collect(),
+        triangles: (0..side * side)
+            .map(|i| i / side * across + i % side)
+            .flat_map(|a| [[a, a + 1, a + across + 1], [a, a + across + 1, a + across]])
+            .collect(),
+        texture: 0,
+        seen: 1.0,
+    };
+    let size = 2048u32;
+    // A slope with a camera's grain.
+    let rgb = (0..3 * size * size).map(|i| (i / (24 * size)) as u8 / 2 + rng.random_range(60..70)).collect();
+    let texture = Texture { name: "look_0".to_owned(), width: size, height: size, rgb };
+    let look = Look { textures: vec![texture], room: vec![mesh], ..Look::default() };
+    let twin = Twin {
+        name: "room".to_owned(),
+        density_kg_per_m3: 700.0,
+        furniture: Vec::new(),
+        room: Vec::new(),
+        left_out: Vec::new(),
+    };
+    stage(c, "encode_files", || {
+        black_box(export::dress::files(&twin, black_box(&look)).unwrap());
+    });
+    stage(c, "encode_glb", || {
+        black_box(export::gltf::write(&twin, Some(black_box(&look)), &[]).unwrap());
+    });
+    stage(c, "encode_usdz", || {
+        black_box(export::usd::write_package(&twin, Some(black_box(&look))).unwrap());
+    });
+}
+
+/// The cells of a room of 6 x 6 x 2.5 m from 150 views of 20,000 samples, seen and seen through.
+fn room_cells(c: &mut Criterion) {
+    let camera = Camera { width: 160, height: 120, fx: 105.0, fy: 105.0, cx: 79.5, cy: 59.5 };
+    let mut rng = Pcg64Mcg::seed_from_u64(8);
+    let (mut frames, mut sketches) = (Vec::new(), Vec::new());
+    for i in 0..150u32 {
+        let eye = Vector::new(rng.random_range(1.0..5.0), rng.random_range(1.0..5.0), 1.6);
+        let turn = nalgebra::UnitQuaternion::from_euler_angles(-1.9, 0.0, rng.random_range(-3.0..3.0));
+        let mut depth = Grid::filled(camera.width, camera.height, 0.0f32);
+        for (at, z) in depth.data.iter_mut().enumerate() {
+            let (u, v) = ((at % camera.width) as f64, (at / camera.width) as f64);
+            let ray = turn * camera.unproject(u, v, 1.0).coords;
+            let wall = |k: usize, high: f64| (if ray[k] > 0.0 { high - eye[k] } else { -eye[k] }) / ray[k];
+            *z = wall(0, 6.0).min(wall(1, 6.0)).min(wall(2, 2.5)) as f32;
+        }
+        let files = FrameFiles { depth: Some(PathBuf::from("x")), ..Default::default() };
+        let world_from_camera = Pose::from_parts(eye.into(), turn);
+        frames.push(Frame { timestamp_secs: f64::from(i), world_from_camera, files });
+        sketches.push(Sketch::of(i as usize, &depth, None));
+    }
+    let recording = Recording { frames, ..Recording::empty(camera) };
+    let views: Vec<&Sketch> = sketches.iter().collect();
+    let axes = [Vector::x(), Vector::y(), Vector::z()];
+    let rules = &config::GatheredRoom::default();
+    let how = pipeline::Gathering { axes, edge_m: 0.05, stride: 2, views: 3, free_views: 2, rules };
+    stage(c, "room_cells", || {
+        black_box(pipeline::gather(&recording, black_box(&views), &how));
+    });
+}
+
 criterion_group! {
     name = stages;
     config = Criterion::default().sample_size(10).measurement_time(Duration::from_secs(3)).warm_up_time(Duration::from_millis(500));
-    targets = voxel_views, view_select, lsd, kalman_rts, normals_manhattan, lines3d_ransac, score_axes
+    targets = voxel_views, view_select, lsd, kalman_rts, normals_manhattan, lines3d_ransac, score_axes, look, encode, room_cells
 }
 criterion_main!(stages);

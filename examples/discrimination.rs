@@ -23,7 +23,7 @@ use paws_twin::error::Error;
 use paws_twin::evaluation::bootstrap::Interval;
 use paws_twin::evaluation::discrimination::{Scored, auc, auc_interval, paired, right_at, roc};
 use paws_twin::evaluation::rules::measure;
-use paws_twin::evaluation::siblings::{Fault, siblings};
+use paws_twin::evaluation::siblings::{JointFault, siblings};
 use paws_twin::evaluation::{Prediction, Predictions, Rule, Truth};
 use paws_twin::fitting::joints::{Entry, JointsFile, Units, from_joints};
 use paws_twin::hands::{self, Trajectory};
@@ -33,7 +33,7 @@ use paws_twin::math::{Vector, stats};
 use paws_twin::recording::{AtWork, Recording, narration};
 use paws_twin::report::table::aligned;
 use paws_twin::synth::kitchen::OpenPart;
-use paws_twin::synth::{Changes, Options, Recorded, Tier};
+use paws_twin::synth::{Changes, Recorded, SynthOptions, Tier};
 use paws_twin::twin::{OrientedBox, Part, Twin};
 use paws_twin::validation::rivals::{Evidence, anchored};
 use paws_twin::validation::{JointCheck, Validation, Verdict, log_odds, validate};
@@ -106,7 +106,7 @@ struct Kitchen {
 /// What the proof says of one joint.
 struct Trial {
     /// What is wrong about it; nothing about the true joint, unknown about an answer.
-    fault: Option<Fault>,
+    fault: Option<JointFault>,
     verdict: Verdict,
     rms_m: f64,
     /// Not a number where there is none.
@@ -114,7 +114,7 @@ struct Trial {
 }
 
 impl Trial {
-    fn of(fault: Option<Fault>, check: &JointCheck) -> Self {
+    fn of(fault: Option<JointFault>, check: &JointCheck) -> Self {
         let margin_nats = check.margin_nats.unwrap_or(f64::NAN);
         Self { fault, verdict: check.verdict, rms_m: check.rms_m, margin_nats }
     }
@@ -323,7 +323,7 @@ fn play_all(args: &Args, tier: Tier, noise_m: Option<f64>, config: &Config) -> R
 /// Plays a kitchen and builds the twin of the parts that were opened, with their true boxes and joints.
 fn play(args: &Args, tier: Tier, number: u64, noise_m: Option<f64>, config: &Config) -> Result<Kitchen, Failure> {
     let seed = args.seed + number;
-    let options = Options { seed, tier, width: 320, parts: args.parts };
+    let options = SynthOptions { seed, tier, width: 320, parts: args.parts };
     let recorded = Recorded::varied(&options, &Changes { hand_noise_m: noise_m, ..Changes::default() })?;
     let folder = tempfile::tempdir()?;
     for (name, text) in recorded.tables()? {
@@ -336,7 +336,7 @@ fn play(args: &Args, tier: Tier, number: u64, noise_m: Option<f64>, config: &Con
     let parts = &recorded.kitchen().parts;
     let entries: Vec<Entry> = parts.iter().filter(|p| opened.contains(p.id.as_str())).map(entry).collect();
     let scene = format!("{} {seed}", tier.name());
-    let twin = built(scene.clone(), entries.clone(), &config.fitting)?;
+    let twin = built(scene.clone(), entries.clone(), config)?;
     let holds = hands::contact::holds(&recording, &AtWork::of(&recording), &config.hands)?;
     let shown: Vec<Vec<Shown>> = twin
         .furniture
@@ -388,8 +388,9 @@ fn entry(part: &OpenPart) -> Entry {
     }
 }
 
-fn built(scene: String, joints: Vec<Entry>, config: &config::Fitting) -> Result<Twin, Failure> {
-    let mut twin = from_joints(&JointsFile { scene, up: Vector::z(), units: Units::M, joints }, config)?;
+fn built(scene: String, joints: Vec<Entry>, config: &Config) -> Result<Twin, Failure> {
+    let mut twin =
+        from_joints(&JointsFile { scene, up: Vector::z(), units: Units::M, joints }, &config.fitting, &config.priors)?;
     for piece in &mut twin.furniture {
         let joint = &mut piece.part.joint;
         joint.balanced = is_carried(&joint.articulation);
@@ -428,7 +429,7 @@ fn case(kitchen: &Kitchen, index: usize, set: &[&Shown], config: &Config) -> Res
     let wrong = siblings(part).into_iter().map(|s| (Some(s.fault), s.articulation));
     let (mut trials, mut not_simulated) = (Vec::new(), 0);
     for (fault, joint) in std::iter::once((None, own)).chain(wrong) {
-        let twin = on(&kitchen.twin, index, joint, &evidence, &config.fitting);
+        let twin = on(&kitchen.twin, index, joint, &evidence, &config.priors.resistance);
         let clips = set.iter().map(|s| (s.clip.clone(), &s.trajectory)).collect();
         match proved(&twin, index, clips, &config.validation)? {
             Some(check) => trials.push(Trial::of(fault, &check)),
@@ -447,12 +448,12 @@ fn case(kitchen: &Kitchen, index: usize, set: &[&Shown], config: &Config) -> Res
 
 /// The twin with another joint in the same furniture. No joint is refuted by its limit: each reaches as far as the hands
 /// went under it, as one that was inferred from them would.
-fn on(twin: &Twin, index: usize, wanted: Articulation, hands: &[Evidence], config: &config::Fitting) -> Twin {
+fn on(twin: &Twin, index: usize, wanted: Articulation, hands: &[Evidence], table: &config::Resistance) -> Twin {
     let mut twin = twin.clone();
     let joint = &mut twin.furniture[index].part.joint;
     let (usual, most, damping, friction) = match wanted.kind {
-        JointKind::Revolute => (USUAL_RAD, MOST_RAD, config.hinge_damping, config.hinge_friction),
-        JointKind::Prismatic => (USUAL_M, MOST_M, config.slide_damping, config.slide_friction),
+        JointKind::Revolute => (USUAL_RAD, MOST_RAD, table.hinge_damping, table.hinge_friction),
+        JointKind::Prismatic => (USUAL_M, MOST_M, table.slide_damping, table.slide_friction),
     };
     if joint.articulation.kind != wanted.kind {
         (joint.upper, joint.damping, joint.friction) = (usual, damping, friction);
@@ -498,11 +499,13 @@ fn class_names(kind: JointKind) -> [&'static str; 3] {
 }
 
 /// Faults of one size, whatever the direction.
-fn family(fault: Fault) -> String {
+fn family(fault: JointFault) -> String {
     match fault {
-        Fault::Type | Fault::Side | Fault::Edge | Fault::Inward => "wrong type, side, edge or sense".to_owned(),
-        Fault::Shift(cm, _) => format!("pivot {cm} cm off"),
-        Fault::Tilt(deg, _) => format!("axis tilted by {deg} deg"),
+        JointFault::Type | JointFault::Side | JointFault::Edge | JointFault::Inward => {
+            "wrong type, side, edge or sense".to_owned()
+        }
+        JointFault::Shift(cm, _) => format!("pivot {cm} cm off"),
+        JointFault::Tilt(deg, _) => format!("axis tilted by {deg} deg"),
     }
 }
 
@@ -520,7 +523,7 @@ fn blocks(scope: &str, cases: &[&Case]) -> Vec<Block> {
     let mut blocks = Vec::new();
     for (kind, cases) in by_kind(cases) {
         let title = format!("{scope}, {}s", kind.word());
-        blocks.push(Block { title: title.clone(), rows: rows(&cases, Fault::name) });
+        blocks.push(Block { title: title.clone(), rows: rows(&cases, JointFault::name) });
         for (i, words) in class_names(kind).into_iter().enumerate() {
             let of_class: Vec<&Case> = cases.iter().copied().filter(|c| class(kind, c.opening) == i).collect();
             if !of_class.is_empty() {
@@ -532,11 +535,11 @@ fn blocks(scope: &str, cases: &[&Case]) -> Vec<Block> {
 }
 
 /// The right joint, the wrong ones by their labels, and all wrong ones.
-fn rows(cases: &[&Case], label: fn(Fault) -> String) -> Vec<Row> {
-    let faults: BTreeSet<Fault> = cases.iter().flat_map(|c| &c.trials).filter_map(|t| t.fault).collect();
+fn rows(cases: &[&Case], label: fn(JointFault) -> String) -> Vec<Row> {
+    let faults: BTreeSet<JointFault> = cases.iter().flat_map(|c| &c.trials).filter_map(|t| t.fault).collect();
     let mut labels: Vec<String> = faults.into_iter().map(label).collect();
     labels.dedup();
-    let row = |name: &str, of_right: bool, wanted: &dyn Fn(Fault) -> bool| {
+    let row = |name: &str, of_right: bool, wanted: &dyn Fn(JointFault) -> bool| {
         let summed = |several: bool| {
             let mut judged = Vec::new();
             for (hand, case) in cases.iter().enumerate().filter(|(_, c)| (c.clips > 1) == several) {
@@ -777,7 +780,7 @@ fn large(kitchens: &[Kitchen], config: &Config) -> Result<(Twin, OwnedHands), Fa
             entries.push(entry);
         }
     }
-    let twin = built("large".to_owned(), entries, &config.fitting)?;
+    let twin = built("large".to_owned(), entries, config)?;
     let in_order = twin.furniture.iter().map(|f| hands.remove(&f.part.id).unwrap_or_default()).collect();
     Ok((twin, in_order))
 }

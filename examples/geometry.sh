@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The steps before the joint inference, ours and the paper's, on synthetic kitchens with a known answer.
+# The steps before the joint inference, ours and the paper's, and the boxes of the room, on synthetic kitchens with a known answer.
 #   examples/geometry.sh [first seed] [kitchens]
 # About five minutes on two cores, most of it for rendering.
 set -euo pipefail

@@ -1,21 +1,14 @@
-//! The library in a few lines: a recording in, joints out.
+//! The library in a few lines: a recording in, joints with their verdicts out.
 //!
 //! `cargo run --release --example infer -- demo/kitchen`
 
-use paws_twin::config::Config;
-use paws_twin::geometry::segments::Lsd;
-use paws_twin::pipeline;
-use paws_twin::reasoning::heuristic::Geometric;
-use paws_twin::recording::Recording;
+use paws_twin::{Config, Made, Recording};
 
 #[allow(clippy::print_stdout, reason = "an example prints")]
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = std::env::args().nth(1).ok_or("give a recording's folder (`paws demo` makes one)")?;
-    let config = Config::default();
-    let recording = Recording::open(folder.as_ref())?;
-    let reasoner = Geometric { reasoning: config.reasoning.clone(), inference: config.inference.clone() };
-    let scene = pipeline::infer(&recording, &config, &Lsd, &reasoner, &|_, _, _| {})?;
-    for joint in &scene.joints {
+    let made = Made::of(&Recording::open(folder.as_ref())?, &Config::default())?;
+    for joint in &made.scene.joints {
         println!(
             "{}: {:?} about {:.3?} through {:.3?}, seen in {}",
             joint.id,
@@ -25,8 +18,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             joint.clips.join(", ")
         );
     }
-    for clip in &scene.clips {
-        if let Some(reason) = clip.joint.reason().filter(|_| scene.joint_of(&clip.clip.clip).is_none()) {
+    for check in &made.validation.joints {
+        println!("{}: {}: {}", check.id, check.verdict.word(), check.reason);
+    }
+    for clip in &made.scene.clips {
+        if let Some(reason) = clip.joint.reason().filter(|_| made.scene.joint_of(&clip.clip.clip).is_none()) {
             println!("{}: no answer, {reason}", clip.clip.clip);
         }
     }

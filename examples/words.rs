@@ -15,7 +15,7 @@ use paws_twin::reasoning::Reasoner;
 use paws_twin::reasoning::heuristic::Geometric;
 use paws_twin::recording::Recording;
 use paws_twin::report::files::predictions;
-use paws_twin::synth::{Options, Recorded, Tier};
+use paws_twin::synth::{Recorded, SynthOptions, Tier};
 
 #[path = "../tests/it/simulated.rs"]
 mod simulated;
@@ -40,11 +40,11 @@ fn main() -> Result<(), Failure> {
     let mut folders = Vec::new();
     for seed in first..first + count {
         let folder = work.path().join(format!("kitchen_{seed}"));
-        render(&Options { seed, tier, width: 320, parts: 6 }, &folder)?;
+        render(&SynthOptions { seed, tier, width: 320, parts: 6 }, &folder)?;
         folders.push(folder);
     }
     let configs = [Config::default(), Config::paper()];
-    let geometric = Geometric { reasoning: configs[0].reasoning.clone(), inference: configs[0].inference.clone() };
+    let geometric = Geometric::of(&configs[0]);
     println!("| model | ours: M | MA | MAO | paper: M | MA | MAO |\n| --- | --- | --- | --- | --- | --- | --- |");
     let none = |config: &Config| row(&folders, config, |_| Ok(Box::new(geometric.clone())));
     println!("| none | {} | {} |", none(&configs[0])?, none(&configs[1])?);
@@ -63,7 +63,7 @@ fn main() -> Result<(), Failure> {
     Ok(())
 }
 
-fn render(options: &Options, folder: &Path) -> Result<(), Failure> {
+fn render(options: &SynthOptions, folder: &Path) -> Result<(), Failure> {
     let recorded = Recorded::new(options)?;
     let write = |name: &str, bytes: &[u8]| -> std::io::Result<()> {
         let path = folder.join(name);
@@ -98,7 +98,7 @@ fn row<'a>(
     for folder in folders {
         let recording = Recording::open(folder)?;
         let scene = pipeline::infer(&recording, config, &Lsd, &*reasoner(folder)?, &|_, _, _| {})?;
-        let twin = fitting::fit(&scene, &recording.up(), &config.fitting);
+        let twin = fitting::fit(&scene, &recording.up(), &config.fitting, &config.priors);
         all.predictions.extend(predictions(&scene, &twin).predictions);
         truths.push(Truth::read(folder)?);
     }

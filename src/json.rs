@@ -48,9 +48,17 @@ pub(crate) fn read_text(path: &Path) -> Result<String> {
         .map_err(|e| Error::format(path, format!("byte {}", e.utf8_error().valid_up_to()), "is not UTF-8 text"))
 }
 
-/// What a file is whose first bytes are no text's, and the way out.
+/// How a pointer begins that stands for a file which was not fetched, and what to say of it.
+pub(crate) const POINTER: (&[u8], &str) = (
+    b"version https://git-lfs.github.com/spec/",
+    "is a Git LFS pointer, not the file that it stands for; fetch it with git lfs pull",
+);
+
+/// What a file is that begins as no JSON does, and the way out.
 fn binary(bytes: &[u8]) -> Option<&'static str> {
     match bytes {
+        _ if bytes.starts_with(POINTER.0) => Some(POINTER.1),
+        _ if bytes.starts_with(b"#ROSBAG V") => Some("is a ROS 1 bag; a JSON file is wanted"),
         [0x1f, 0x8b, ..] => Some("is compressed (gzip); unpack it first"),
         [0x28, 0xb5, 0x2f, 0xfd, ..] => Some("is compressed (zstd); unpack it first"),
         [b'B', b'Z', b'h', ..] => Some("is compressed (bzip2); unpack it first"),
@@ -183,10 +191,12 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.json");
         let utf16: Vec<u8> = "\u{feff}{}".encode_utf16().flat_map(u16::to_le_bytes).collect();
-        let cases: [(&[u8], &str); 13] = [
+        let cases: [(&[u8], &str); 15] = [
             (b"\x1f\x8b\x08\x00", "gzip"),
             (&utf16, "UTF-16"),
             (b"{\x00}\x00", "UTF-16"),
+            (b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n", "git lfs pull"),
+            (b"#ROSBAG V2.0\n", "ROS 1 bag"),
             (b"<robot/>", "XML"),
             (b"scene: s\njoints: []\n", "YAML"),
             (b"// made by hand\n{}", "comments"),

@@ -1,11 +1,11 @@
 //! A rendered kitchen on disk, for benches that read images.
 
 use paws_twin::recording::Recording;
-use paws_twin::synth::{Options, Recorded};
+use paws_twin::synth::{Recorded, SynthOptions};
 use tempfile::TempDir;
 
 /// The recording and its folder, which goes when it is dropped.
-pub fn recorded(options: &Options) -> (TempDir, Recording) {
+pub fn recorded(options: &SynthOptions) -> (TempDir, Recording) {
     let dir = tempfile::tempdir().unwrap();
     let recorded = Recorded::new(options).unwrap();
     let images = (0..recorded.frames()).flat_map(|frame| recorded.images(frame).unwrap());

@@ -1,9 +1,10 @@
 """A batch on Ray: python batch_ray.py MANIFEST OUT [SHARDS] (pip install ray; RAY_ADDRESS names a cluster, else this machine)
 
-Manifest and output have to be seen by all nodes; paws has to be installed there.
+Manifest, recordings and output have to be seen by all nodes, and the package has to be installed there. More shards than cores
+keep all cores busy to the end; each shard has a journal, so that whatever dies goes on where it was.
 """
 
-import subprocess
+import os
 import sys
 from pathlib import Path
 
@@ -15,21 +16,25 @@ except ImportError as error:
     sys.exit(f"ray is not installed: {error}")
 
 manifest, out = (str(Path(path).resolve()) for path in sys.argv[1:3])
-shards = int(sys.argv[3]) if len(sys.argv) > 3 else 2
-ray.init()
+address = os.environ.get("RAY_ADDRESS")
+ray.init(address, include_dashboard=False, log_to_driver=False)
+shards = int(sys.argv[3]) if len(sys.argv) > 3 else 4 * int(ray.cluster_resources()["CPU"])
+options = {"no_textures": True} if os.environ.get("PAWS_NO_TEXTURES") else {}
 
 
-# A worker that dies is started again: the journal of its shard says where it was.
+# One core is one recording at a time. A worker that dies is started again.
 @ray.remote(num_cpus=1, max_retries=3)
-def shard(number):
-    command = ["paws", "batch", manifest, "--out", out, "--shard", f"{number}/{shards}", "--jobs", "1"]
-    done = subprocess.run(command, capture_output=True, text=True)
-    if done.returncode not in (0, 1):
-        raise RuntimeError(done.stderr)
+def part(number):
+    os.environ["RAYON_NUM_THREADS"] = "1"
+    paws_twin.batch.run(manifest, out, shard=f"{number}/{shards}", jobs=1, **options)
     return number
 
 
-for number in ray.get([shard.remote(number) for number in range(1, shards + 1)]):
-    print(f"shard {number} of {shards} is done")
-for row in paws_twin.batch.run(manifest, out)["results"]:
+left = [part.remote(number) for number in range(1, shards + 1)]
+while left:
+    done, left = ray.wait(left)
+    for number in ray.get(done):
+        print(f"shard {number} of {shards} is done")
+# What is missing, and the tables.
+for row in paws_twin.batch.run(manifest, out, **options)["results"]:
     print(row["name"], row["status"], row["reason"])

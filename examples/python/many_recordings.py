@@ -20,7 +20,7 @@ with open(folder / "manifest.csv", "w", newline="") as file:
     rows.writerow(["lost", "nowhere"])
 
 # 2. The batch. It may be killed at any moment: what is finished is not repeated when it runs again.
-tables = paws_twin.batch.run(folder / "manifest.csv", folder / "out", jobs=2)
+tables = paws_twin.batch.run(folder / "manifest.csv", folder / "out", jobs=2, no_textures=True)
 for row in tables["results"]:
     print(row["name"], row["status"], row["reason"])
 

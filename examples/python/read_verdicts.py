@@ -10,7 +10,7 @@ if len(sys.argv) > 1:
     recording = paws_twin.Recording(sys.argv[1])
 else:
     recording = paws_twin.synth(seed=3, tier="clean", width=160, parts=2)
-twin = paws_twin.twin(recording)
+twin = paws_twin.twin(recording, no_textures=True)
 
 for verdict in twin.validation.joints:
     # How much likelier the joint is than the best other explanation of its hands, as a logarithm.

@@ -10,7 +10,7 @@ import paws_twin
 if len(sys.argv) > 1:
     twin = paws_twin.Twin(sys.argv[1])
 else:
-    twin = paws_twin.twin(paws_twin.synth(seed=3, tier="clean", width=160, parts=2))
+    twin = paws_twin.twin(paws_twin.synth(seed=3, tier="clean", width=160, parts=2), no_textures=True)
 
 # 1. Alone: with a floor, a light, and keyframes "closed" and "open".
 model = twin.mujoco()

@@ -5,9 +5,9 @@
 
 #![no_main]
 
-mod files;
-mod imports;
 mod memory;
+#[path = "../../tests/it/readers/mod.rs"]
+mod readers;
 mod targets;
 
 use libfuzzer_sys::{fuzz_target, Corpus};

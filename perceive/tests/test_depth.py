@@ -27,6 +27,8 @@ def values_of(data):
 def test_depth_files_hold_their_values():
     values = np.random.default_rng(0).uniform(0.1, 9, (5, 7)).astype(np.float32)
     assert np.array_equal(values_of(exr.encoded(values)), values)
+    assert np.array_equal(exr.decoded(exr.encoded(values)), values)
+    assert exr.decoded(exr.encoded(values)[:-40]) is None and exr.decoded(b"rubbish") is None
 
 
 def model_folder(path, **config):
@@ -56,11 +58,11 @@ class Network:
     def __init__(self):
         self.calls = 0
 
-    def run(self, image):
+    def run(self, images, prompts=None, fov_deg=None):
         self.calls += 1
         if self.calls == 3:
             raise KeyboardInterrupt
-        return np.full(image.shape[:2], 2.5, np.float32)
+        return [(np.full(image.shape[:2], 2.5, np.float32), None) for image in images]
 
 
 class Cv2:
@@ -90,6 +92,104 @@ def test_a_run_that_is_stopped_goes_on_and_a_changed_image_alone_is_made_anew(tm
     assert network.calls == 6
 
 
+def test_a_file_that_is_not_what_its_sums_say_is_named_with_its_place(tmp_path):
+    folder = model_folder(tmp_path / "model")
+    digest = adapters.of("depth").about_model(folder)[1]["model.safetensors"]
+    (folder / "SHA256SUMS").write_text(f"{digest}  model.safetensors\n{'0' * 64} *other.bin\n")
+    adapters.of("depth").about_model(folder)
+    (folder / "SHA256SUMS").write_text(f"{'1' * 64}  model.safetensors\n")
+    with pytest.raises(Failure, match="model.safetensors: is not the file that SHA256SUMS.*put the right model.safetensors into"):
+        adapters.of("depth").about_model(folder)
+    (folder / "model.safetensors").write_bytes(b"")
+    with pytest.raises(Failure, match="0 bytes.*download it again"):
+        adapters.of("depth").about_model(folder)
+
+
+def test_the_licence_of_a_model_is_that_of_its_card(tmp_path):
+    module, folder = adapters.of("depth"), model_folder(tmp_path / "model")
+    assert "the model's own" in module.licence(folder)
+    (folder / "README.md").write_text("---\nlicense: apache-2.0\ntags:\n- depth\n---\n# A model\n")
+    assert module.licence(folder) == "apache-2.0"
+
+
+def a_recording(folder, frames, with_depth=()):
+    """A recording of so many frames, its images grey, with a sensor's depth in some of them."""
+    cv2 = pytest.importorskip("cv2")
+    (folder / "frames").mkdir(parents=True)
+    (folder / "depth").mkdir()
+    listed = []
+    for n in range(frames):
+        cv2.imwrite(str(folder / f"frames/{n:06d}.jpg"), np.full((48, 64, 3), 40 + n, np.uint8))
+        listed.append({"frame": n, "file": f"frames/{n:06d}.jpg", "timestamp": 0.1 * n, "position": [0, 0, 0], "rotation_wxyz": [1, 0, 0, 0]})
+    for n in with_depth:
+        sensor = np.full((48, 64), 1500, np.uint16)
+        sensor[:, :20] = 0
+        sensor[10, 30] = 0
+        cv2.imwrite(str(folder / f"depth/{n:06d}.png"), sensor)
+    cameras = {"width": 64, "height": 48, "fx": 64, "fy": 64, "cx": 31.5, "cy": 23.5, "frames": listed}
+    (folder / "cameras.json").write_text(json.dumps(cameras))
+    return folder
+
+
+class Tilted:
+    """Sees a wall at 2.5 m whose normal leans up, with a hole in a corner."""
+
+    def __init__(self):
+        self.seen, self.fov, self.prompts = [], None, None
+
+    def run(self, images, prompts=None, fov_deg=None):
+        self.seen.append(len(images))
+        self.fov, self.prompts = fov_deg, prompts
+        depth = np.full(images[0].shape[:2], 2.5, np.float32)
+        depth[0, 0], depth[1, 1] = 0, 70.0
+        normals = np.zeros((*depth.shape, 3))
+        normals[...] = [0.0, -0.6, -0.8]
+        normals[0, 0] = 0
+        return [(depth, normals) for _ in images]
+
+
+def test_depth_and_normals_of_chosen_frames_go_into_a_recording(tmp_path, monkeypatch):
+    cv2 = pytest.importorskip("cv2")
+    folder, model = a_recording(tmp_path / "rec", 6, with_depth=[1]), model_folder(tmp_path / "model")
+    network, said = Tilted(), []
+    monkeypatch.setattr(adapters.of("depth"), "load", lambda device, weights: network)
+    before = (folder / "depth/000001.png").read_bytes()
+    count = depth.run_recording(folder, tmp_path / "cache", model, "gpu", say=said.append, frames=[0, 1, 4])
+    assert count == 2 and network.seen == [2] and abs(network.fov - 53.13) < 0.01
+    assert sorted(p.name for p in (folder / "depth").iterdir()) == ["000000.png", "000001.png", "000004.png"]
+    assert (folder / "depth/000001.png").read_bytes() == before
+    held = cv2.imread(str(folder / "depth/000004.png"), cv2.IMREAD_UNCHANGED)
+    # No value, and what is farther than 16 bits of millimetres, are none.
+    assert held.dtype == np.uint16 and held[5, 5] == 2500 and held[0, 0] == 0 and held[1, 1] == 0
+    normals = cv2.imread(str(folder / "normals/000004.png"))[:, :, ::-1].astype(float)
+    read = (normals[5, 5] - 128) / 127
+    assert np.allclose(read, [0, -0.6, -0.8], atol=0.012) and (normals[0, 0] == 0).all()
+    made = json.loads((folder / "import.json").read_text())["perceived"][0]
+    assert made["stream"] == "depth" and made["frames"] == 2 and made["normals"] == 2 and made["weights"]
+    depth.run_recording(folder, tmp_path / "cache", model, "gpu", redo=False, say=said.append, frames=[0, 4])
+    assert network.seen == [2]
+
+
+def test_what_a_sensor_saw_is_refined_by_a_network_that_takes_it(tmp_path, monkeypatch):
+    cv2 = pytest.importorskip("cv2")
+    folder, model = a_recording(tmp_path / "rec", 3, with_depth=[0, 2]), model_folder(tmp_path / "model", model_type="prompt_depth_anything")
+    network = Tilted()
+    monkeypatch.setattr(adapters.of("depth"), "load", lambda device, weights: network)
+    assert depth.run_recording(folder, tmp_path / "cache", model, say=str) == 2
+    assert (network.prompts[0] == 1500).all() and network.prompts[0].shape == (48, 64)
+    assert cv2.imread(str(folder / "depth/000002.png"), cv2.IMREAD_UNCHANGED)[5, 5] == 2500
+    bare = a_recording(tmp_path / "bare", 2)
+    with pytest.raises(Failure, match="refines that of a phone's LiDAR"):
+        depth.run_recording(bare, tmp_path / "cache", model, say=str)
+    with pytest.raises(Failure, match="give it a recording that has depth"):
+        depth.run(bare / "frames", tmp_path / "out.json", tmp_path / "cache", model, say=str)
+
+
+def test_of_many_images_a_few_evenly_spread_tell_the_scale(tmp_path):
+    assert depth.spread(list(range(100)), 4) == [0, 25, 50, 75]
+    assert depth.spread([1, 2], 4) == depth.spread([1, 2], None) == [1, 2]
+
+
 @pytest.mark.parametrize("kind", ["depth_anything"])
 def test_the_real_classes_run_with_a_tiny_random_model(tmp_path, kind):
     """Shapes and units: the largest depth of a metric model is what its config says."""
@@ -109,7 +209,8 @@ def test_the_real_classes_run_with_a_tiny_random_model(tmp_path, kind):
     transformers.DPTImageProcessor(size={"height": 28, "width": 28}, ensure_multiple_of=14).save_pretrained(folder)
     module = adapters.of("depth")
     assert module.about_model(folder)[0] == kind
-    found = module.load("cpu", folder).run(np.random.default_rng(0).integers(0, 255, (30, 40, 3), dtype=np.uint8))
+    found, normals = module.load("cpu", folder).run([np.random.default_rng(0).integers(0, 255, (30, 40, 3), dtype=np.uint8)])[0]
+    assert normals is None
     assert found.shape == (30, 40) and found.dtype == np.float32 and (found > 0).all() and (found < 20).all()
     if not torch.cuda.is_available():
         with pytest.raises(Failure, match="no GPU.*leave out --gpu"):

@@ -33,6 +33,26 @@ def test_redo_and_streams_without_images():
     assert {r[0]: r[1] for r in plan.plan({**PHONE, "images": 0})}["hands"] == "needs images"
 
 
+def test_what_is_asked_for_is_planned_with_its_licence(tmp_path):
+    model = tmp_path / "moge"
+    model.mkdir()
+    (model / "model.pt").write_bytes(b"1")
+    wishes = plan.Wishes("gpu", depth_model=str(model), make=("masks", "lines"), by=("lines=limap", "poses=mapanything"))
+    rows = {r[0]: r for r in plan.plan(VIDEO, wishes=wishes)}
+    assert rows["depth"][1] == "moge" and rows["masks"][1] == "hands' joints" and rows["lines"][1] == "limap"
+    text = plan.text(VIDEO, wishes)
+    for word in ("--accept-licence mapanything", "CC BY-NC 4.0", "BSD-3-Clause", "two of five", "grounding-dino"):
+        assert word in text, word
+    for name in ("grounding-dino", "sam2"):
+        (tmp_path / "weights" / name).mkdir(parents=True)
+    wishes = plan.Wishes("gpu", weights=str(tmp_path / "weights"), make=("masks",))
+    assert {r[0]: r for r in plan.plan(PHONE, wishes=wishes)}["masks"][1] == "grounded-sam2"
+    # Nobody asked for them: they are no rows.
+    assert not {"masks", "lines"} & {r[0] for r in plan.plan(PHONE)}
+    with pytest.raises(Failure, match="no network is known as nothing"):
+        plan.plan(VIDEO, wishes=plan.Wishes(by=("hands=nothing",)))
+
+
 def test_the_standard_library_is_enough():
     """Isolated, without site-packages: what is not of the standard library cannot be loaded."""
     code = f"import sys; sys.path.insert(0, {str(SOURCES)!r}); from paws_perceive.__main__ import main; sys.exit(main())"

@@ -104,6 +104,18 @@ def test_a_broken_image_costs_itself_and_no_hand_is_an_answer(made, tmp_path):
     assert json.loads((folder / "hands.json").read_text())["frames"] == []
 
 
+def test_a_hand_that_never_moves_is_told(made, tmp_path):
+    folder, network, _ = made
+    network.truth = [hand() + [0.0, 0.05, 0.5]] * FRAMES
+    said = []
+    assert hands.run(folder, tmp_path / "cache", say=said.append) == FRAMES
+    assert any("hardly moves in the picture" in s for s in said)
+    network.truth = [hand() + [0.05 * n - 0.3, 0.05, 0.5] for n in range(FRAMES)]
+    said.clear()
+    hands.run(folder, tmp_path / "other", say=said.append)
+    assert not any("hardly moves" in s for s in said)
+
+
 def test_files_outside_of_the_recording_are_not_read(made):
     folder, _, _ = made
     cameras = json.loads((folder / "cameras.json").read_text())

@@ -1,4 +1,6 @@
-"""What the tests share: a small recording with a known answer, and its twin, made once."""
+"""What the tests share: a small recording with a known answer, and its twin, made once, without textures: they take most of the
+time, and are what `make_a_twin.py` of the gallery has.
+"""
 
 import pytest
 
@@ -12,4 +14,4 @@ def recording(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def twin(recording, tmp_path_factory):
-    return paws_twin.twin(recording, tmp_path_factory.mktemp("twin") / "twin")
+    return paws_twin.twin(recording, tmp_path_factory.mktemp("twin") / "twin", no_textures=True)

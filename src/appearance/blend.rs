@@ -6,14 +6,14 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::charts::Chart;
-use super::texture::{Sample, Texel, Tile, name};
+use super::texels::{Texel, TexelSample, TexelTile, name};
 use crate::look::Texture;
 
 /// Darker and brighter values than these say nothing about an exposure, 8-bit levels.
 const DARK: u8 = 16;
 const BRIGHT: u8 = 240;
-/// Texels that take part in the balance at the most: a thousandth of them would do.
-const BALANCED: usize = 300_000;
+/// Texels that take part in the balance at the most: a thousandth of all would do.
+const BALANCED: usize = 60_000;
 /// Pairs that differ by more than this factor, as a logarithm, show two things and not two exposures.
 const OTHER: f64 = 0.4;
 /// Pull of each frame's gain to 1, as a share of what its pairs weigh: it only fixes what no pair tells.
@@ -31,16 +31,16 @@ type Gain = [f32; 3];
 /// Colours of the charts on their pages, and of each chart the texels that were seen and all that are covered.
 pub(super) fn pages(
     charts: &[Chart],
-    tiles: &[Tile],
+    tiles: &[TexelTile],
     sizes: &[[u32; 2]],
     frames: usize,
 ) -> (Vec<Texture>, Vec<[usize; 2]>) {
     let gains = gains(tiles, frames);
     let ranges = ranges(charts, tiles);
-    let blended: Vec<Picture> = charts
+    let blended: Vec<ChartPicture> = charts
         .par_iter()
         .zip(&ranges)
-        .map(|(chart, range)| Picture::of(chart, tiles.get(range.clone()).unwrap_or_default(), &gains))
+        .map(|(chart, range)| ChartPicture::of(chart, tiles.get(range.clone()).unwrap_or_default(), &gains))
         .collect();
     let counts: Vec<[usize; 2]> = blended.iter().map(|p| [p.seen, p.covered]).collect();
     let colours = Colours::of(charts, &blended);
@@ -74,7 +74,7 @@ pub(super) fn pages(
 }
 
 /// The tiles of each chart: they lie in the charts' order.
-fn ranges(charts: &[Chart], tiles: &[Tile]) -> Vec<Range<usize>> {
+fn ranges(charts: &[Chart], tiles: &[TexelTile]) -> Vec<Range<usize>> {
     let mut at = 0;
     (0..charts.len())
         .map(|chart| {
@@ -88,7 +88,7 @@ fn ranges(charts: &[Chart], tiles: &[Tile]) -> Vec<Range<usize>> {
 }
 
 /// Each frame's gain a channel, by least squares over texels that several frames show: logarithms of what they show, made equal.
-fn gains(tiles: &[Tile], frames: usize) -> Vec<Gain> {
+fn gains(tiles: &[TexelTile], frames: usize) -> Vec<Gain> {
     let all: usize = tiles.iter().map(|t| t.texels.len()).sum();
     let stride = (all / BALANCED).max(1);
     let chosen: Vec<&Texel> = tiles.iter().flat_map(|t| &t.texels).step_by(stride).collect();
@@ -113,7 +113,7 @@ fn balanced(texels: &[&Texel], channel: usize, logs: &[f64], gains: &[f64], gate
     let n = gains.len();
     let mut matrix = DMatrix::<f64>::zeros(n, n);
     let mut rhs = DVector::<f64>::zeros(n);
-    let usable = |s: &Sample| s.score > 0 && (DARK..=BRIGHT).contains(&s.rgb[channel]);
+    let usable = |s: &TexelSample| s.score > 0 && (DARK..=BRIGHT).contains(&s.rgb[channel]);
     for texel in texels {
         for (i, a) in texel.samples.iter().enumerate() {
             for b in texel.samples.iter().skip(i + 1).filter(|b| usable(b) && usable(a)) {
@@ -140,8 +140,8 @@ fn balanced(texels: &[&Texel], channel: usize, logs: &[f64], gains: &[f64], gate
 }
 
 /// The colour of a texel: the samples that agree with the one that most of the weight agrees with.
-fn blend(samples: &[Sample], gains: &[Gain]) -> Option<[f32; 3]> {
-    let colour = |s: &Sample| -> [f32; 3] {
+fn blend(samples: &[TexelSample], gains: &[Gain]) -> Option<[f32; 3]> {
+    let colour = |s: &TexelSample| -> [f32; 3] {
         let gain = gains.get(usize::from(s.sight)).copied().unwrap_or([1.0; 3]);
         std::array::from_fn(|k| f32::from(s.rgb[k]) * gain[k])
     };
@@ -165,15 +165,15 @@ fn blend(samples: &[Sample], gains: &[Gain]) -> Option<[f32; 3]> {
 }
 
 /// A chart's colours; the fourth number is 1 where a colour is known, else 0.
-struct Picture {
+struct ChartPicture {
     width: usize,
     texels: Vec<[f32; 4]>,
     seen: usize,
     covered: usize,
 }
 
-impl Picture {
-    fn of(chart: &Chart, tiles: &[Tile], gains: &[Gain]) -> Self {
+impl ChartPicture {
+    fn of(chart: &Chart, tiles: &[TexelTile], gains: &[Gain]) -> Self {
         let [width, height] = chart.size.map(|s| s as usize);
         let mut picture = Self { width, texels: vec![[0.0; 4]; width * height], seen: 0, covered: 0 };
         for texel in tiles.iter().flat_map(|t| &t.texels) {
@@ -196,7 +196,7 @@ impl Picture {
         } else {
             fill(&mut self.texels, self.width);
         }
-        self.texels.iter().flat_map(|t| [t[0], t[1], t[2]].map(|c| c.round().clamp(0.0, 255.0) as u8)).collect()
+        self.texels.iter().flat_map(|t| [t[0], t[1], t[2]].map(|c| (c + 0.5) as u8)).collect()
     }
 }
 
@@ -247,7 +247,7 @@ struct Colours {
 }
 
 impl Colours {
-    fn of(charts: &[Chart], pictures: &[Picture]) -> Self {
+    fn of(charts: &[Chart], pictures: &[ChartPicture]) -> Self {
         let parts = charts.iter().filter_map(|c| c.owner.max(c.assumed)).max().map_or(0, |most| most + 1);
         let of = |wanted: &dyn Fn(&Chart) -> bool| {
             let own = charts.iter().zip(pictures).filter(|&(c, _)| wanted(c)).map(|(_, p)| p);
@@ -268,7 +268,7 @@ impl Colours {
 }
 
 /// The median of each channel over what is known of pictures; `None` where nothing is.
-fn median<'a>(pictures: impl Iterator<Item = &'a Picture>) -> Option<[f32; 3]> {
+fn median<'a>(pictures: impl Iterator<Item = &'a ChartPicture>) -> Option<[f32; 3]> {
     let mut counts = vec![[0u64; 3]; 256];
     let mut all = 0u64;
     for t in pictures.flat_map(|p| &p.texels).filter(|t| t[3] > 0.0) {
@@ -292,8 +292,8 @@ fn median<'a>(pictures: impl Iterator<Item = &'a Picture>) -> Option<[f32; 3]> {
 mod tests {
     use super::*;
 
-    fn sample(sight: u16, level: u8, score: u16) -> Sample {
-        Sample { score, sight, rgb: [level; 3] }
+    fn sample(sight: u16, level: u8, score: u16) -> TexelSample {
+        TexelSample { score, sight, rgb: [level; 3] }
     }
 
     #[test]
@@ -302,7 +302,7 @@ mod tests {
         let samples = [sample(0, 100, 20_000), sample(1, 104, 20_000), sample(2, 250, 21_000), sample(3, 0, 0)];
         let [r, _, b] = blend(&samples, &gains).unwrap();
         assert!((101.9..102.1).contains(&r) && r == b, "{r}");
-        assert_eq!(blend(&[Sample::default(); 4], &gains), None);
+        assert_eq!(blend(&[TexelSample::default(); 4], &gains), None);
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Where a part's surfaces are in a frame, and which pixels may see them.
 
-use super::Local;
-use super::frames::State;
-use super::sights::Lens;
+use super::frame_choice::State;
+use super::local::Local;
+use super::sight_camera::SightCamera;
 use crate::math::Vector;
 use crate::twin::{OrientedBox, Part, Role};
 
@@ -57,7 +57,7 @@ fn grown(shape: &OrientedBox, by: f64) -> OrientedBox {
 }
 
 /// Columns and rows of the pixels that may see a ball (camera frame).
-pub(super) fn window(lens: &Lens, middle: &Local, radius: f32) -> [std::ops::Range<usize>; 2] {
+pub(super) fn window(lens: &SightCamera, middle: &Local, radius: f32) -> [std::ops::Range<usize>; 2] {
     let sizes = [lens.width, lens.height];
     if middle.z + radius <= 0.0 {
         return sizes.map(|_| 0..0);

@@ -1,7 +1,9 @@
 //! Pieces of surface laid flat: triangles that hang together and look the same way, projected onto a plane, packed onto pages.
 
-use super::Local;
-use super::mesh::Mesh;
+use super::local::Local;
+use super::pages;
+use super::regions::{self, fits, nearest};
+use super::surface_mesh::SurfaceMesh;
 
 /// Texels around a chart that repeat its rim, for filters that look beyond it.
 pub(super) const RIM: u32 = 2;
@@ -9,8 +11,6 @@ pub(super) const RIM: u32 = 2;
 pub(super) const PAGE: u32 = 4096;
 /// Rounds in which a triangle takes the direction of its neighbours.
 const ROUNDS: usize = 4;
-/// A triangle seen at less than this (cosine) from its chart's direction would be smeared.
-const LEAST_COSINE: f32 = 0.3;
 /// No direction.
 const NONE: u8 = u8::MAX;
 
@@ -28,6 +28,8 @@ pub(super) struct Chart {
     pub(super) triangles: Vec<[u32; 3]>,
     /// Right, down and out of the chart: orthonormal, `right x down = -out`.
     pub(super) axes: [Local; 3],
+    /// Edge of the texels below which no frame shows more of it, metres; 0 = none is known.
+    pub(super) finest: f32,
     /// Of the first texel along right and down, metres.
     pub(super) low: [f32; 2],
     /// Edge of a texel, metres; 0 before [`pack`].
@@ -49,6 +51,7 @@ impl Chart {
             normals,
             triangles,
             axes: axes_of(out),
+            finest: 0.0,
             low: [0.0; 2],
             texel: 0.0,
             size: [0; 2],
@@ -91,43 +94,28 @@ fn axes_of(out: &Local) -> [Local; 3] {
     [right, -out.cross(&right), *out]
 }
 
-/// The charts of a mesh, for directions along the room's axes and between them.
-pub(super) fn of_mesh(mesh: &Mesh, room: &[Local; 3]) -> Vec<Chart> {
+/// The charts of a mesh, for directions along the room's axes and between them. None is smaller than `least_m2` that borders on
+/// another.
+pub(super) fn of_mesh(mesh: &SurfaceMesh, room: &[Local; 3], least_m2: f64) -> Vec<Chart> {
     let directions = directions(room);
     let beside = beside(mesh);
     let labels = labels(mesh, &beside, &directions);
     let normals = normals(mesh);
-    let mut charts = Vec::new();
-    let mut taken = vec![false; mesh.triangles.len()];
     let mut number = vec![u32::MAX; mesh.positions.len()];
-    for start in 0..mesh.triangles.len() {
-        if taken[start] || labels[start] == NONE {
-            continue;
-        }
-        taken[start] = true;
-        let mut piece = vec![start];
-        let mut next = 0;
-        while let Some(&t) = piece.get(next) {
-            next += 1;
-            for other in beside[t].iter().map(|o| *o as usize) {
-                if other < taken.len() && !taken[other] && labels[other] == labels[start] {
-                    taken[other] = true;
-                    piece.push(other);
-                }
-            }
-        }
-        let mut vertices: Vec<u32> = piece.iter().flat_map(|&t| mesh.triangles[t]).collect();
+    let chart = |region: regions::ChartRegion| {
+        let own = || region.triangles.iter().map(|&t| mesh.triangles[t as usize]);
+        let mut vertices: Vec<u32> = own().flatten().collect();
         vertices.sort_unstable();
         vertices.dedup();
         vertices.iter().enumerate().for_each(|(i, v)| number[*v as usize] = i as u32);
-        charts.push(Chart::new(
+        Chart::new(
             vertices.iter().map(|&v| mesh.positions[v as usize]).collect(),
             vertices.iter().map(|&v| normals[v as usize]).collect(),
-            piece.iter().map(|&t| mesh.triangles[t].map(|v| number[v as usize])).collect(),
-            &directions[usize::from(labels[start])],
-        ));
-    }
-    charts
+            own().map(|t| t.map(|v| number[v as usize])).collect(),
+            &directions[region.direction],
+        )
+    };
+    regions::regions(mesh, &beside, &labels, &directions, least_m2).into_iter().map(chart).collect()
 }
 
 /// The room's six directions, then the twelve between two of them.
@@ -142,7 +130,7 @@ fn directions(room: &[Local; 3]) -> Vec<Local> {
 }
 
 /// The triangles beside each triangle across its edges; `u32::MAX` where there is none.
-fn beside(mesh: &Mesh) -> Vec<[u32; 3]> {
+fn beside(mesh: &SurfaceMesh) -> Vec<[u32; 3]> {
     // Each edge by its ends, the lower first, with the triangle and the edge's number there.
     let mut edges: Vec<([u32; 2], u32, u8)> = Vec::with_capacity(3 * mesh.triangles.len());
     for (i, t) in mesh.triangles.iter().enumerate() {
@@ -164,7 +152,7 @@ fn beside(mesh: &Mesh) -> Vec<[u32; 3]> {
 }
 
 /// The direction of each triangle: its own nearest, then that of most of its neighbours where it may be.
-fn labels(mesh: &Mesh, beside: &[[u32; 3]], directions: &[Local]) -> Vec<u8> {
+fn labels(mesh: &SurfaceMesh, beside: &[[u32; 3]], directions: &[Local]) -> Vec<u8> {
     let normals: Vec<Local> = mesh.triangles.iter().map(|t| mesh.across(t)).collect();
     // Noise turns single triangles: each is judged with those around it.
     let smooth: Vec<Local> = normals
@@ -176,12 +164,9 @@ fn labels(mesh: &Mesh, beside: &[[u32; 3]], directions: &[Local]) -> Vec<u8> {
         .iter()
         .zip(&smooth)
         .map(|(own, smooth)| {
-            let best = |n: &Local| {
-                let along = directions.iter().map(|d| d.dot(n));
-                along.enumerate().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0))).map_or(NONE, |b| b.0 as u8)
-            };
-            let label = best(smooth);
-            if fits(own, label, directions) { label } else { best(own) }
+            let label = nearest(smooth, directions);
+            let label = if fits(own, label, directions) { label } else { nearest(own, directions) };
+            label as u8
         })
         .collect();
     for _ in 0..ROUNDS {
@@ -190,7 +175,7 @@ fn labels(mesh: &Mesh, beside: &[[u32; 3]], directions: &[Local]) -> Vec<u8> {
             let [a, b, c] = beside.map(|o| before.get(o as usize).copied().unwrap_or(NONE));
             let most = if a == b || a == c { a } else { b };
             let two = usize::from(a == most) + usize::from(b == most) + usize::from(c == most) >= 2;
-            if two && most != *label && fits(&normals[i], most, directions) {
+            if two && most != *label && fits(&normals[i], usize::from(most), directions) {
                 *label = most;
             }
         }
@@ -198,13 +183,8 @@ fn labels(mesh: &Mesh, beside: &[[u32; 3]], directions: &[Local]) -> Vec<u8> {
     labels
 }
 
-/// Whether a triangle may lie on a chart of a direction.
-fn fits(across: &Local, label: u8, directions: &[Local]) -> bool {
-    directions.get(usize::from(label)).is_some_and(|d| d.dot(across) > LEAST_COSINE * across.norm())
-}
-
 /// A unit normal a vertex, weighted by areas.
-fn normals(mesh: &Mesh) -> Vec<Local> {
+pub(super) fn normals(mesh: &SurfaceMesh) -> Vec<Local> {
     let mut out = vec![Local::zeros(); mesh.positions.len()];
     for t in &mesh.triangles {
         let across = mesh.across(t);
@@ -213,57 +193,47 @@ fn normals(mesh: &Mesh) -> Vec<Local> {
     out.iter().map(|n| n.try_normalize(1e-20).unwrap_or_else(Local::z)).collect()
 }
 
-/// Chooses the texels' size and a place on a page for each chart, in rows of falling height. Returns the pages' sizes.
+/// Chooses the texels' size and a place on a page for each chart. Texels are as large as asked for, or as what a chart's frames show
+/// of it; all grow together until they fit. Returns the pages' sizes.
 pub(super) fn pack(charts: &mut [Chart], texel_m: f64, most_texels: usize) -> Vec<[u32; 2]> {
     let bounds: Vec<[[f32; 2]; 2]> = charts.iter().map(Chart::bounds).collect();
-    let longest = bounds.iter().flatten().map(|[low, high]| high - low).fold(0.0, f32::max);
-    // A chart fits onto a page, with its rims and a texel of rounding.
-    let mut texel = (texel_m as f32).max(longest / (PAGE - 2 * RIM - 2) as f32);
+    let finest = texel_m as f32;
+    let mut coarser = 1.0f32;
     for _ in 0..20 {
         for (chart, bounds) in charts.iter_mut().zip(&bounds) {
             let [[left, right], [top, bottom]] = *bounds;
+            let longest = (right - left).max(bottom - top);
+            // A chart fits onto a page, with its rims and a texel of rounding.
+            let fitting = longest / (PAGE - 2 * RIM - 2) as f32;
+            let wanted = coarser * finest.max(chart.finest).max(fitting);
             // What nobody saw has one colour.
-            chart.texel = if chart.assumed.is_some() { texel.max((right - left).max(bottom - top)) } else { texel };
+            chart.texel = if chart.assumed.is_some() { wanted.max(longest) } else { wanted };
             chart.low = [left, top].map(|c| c - RIM as f32 * chart.texel);
             chart.size = [right - left, bottom - top].map(|c| ((c / chart.texel).ceil() as u32).max(1) + 2 * RIM);
         }
-        let all: u64 = charts.iter().map(|c| u64::from(c.size[0]) * u64::from(c.size[1])).sum();
+        let all = texels(charts);
         if all <= most_texels as u64 {
             break;
         }
-        texel *= (all as f32 / most_texels.max(1) as f32).sqrt().clamp(1.02, 2.0);
+        coarser *= (all as f32 / most_texels.max(1) as f32).sqrt().clamp(1.02, 2.0);
     }
-    rows(charts)
-}
-
-fn rows(charts: &mut [Chart]) -> Vec<[u32; 2]> {
-    let all: u64 = charts.iter().map(|c| u64::from(c.size[0]) * u64::from(c.size[1])).sum();
+    // About square, a little wider as not all of it is filled.
     let widest = charts.iter().map(|c| c.size[0]).max().unwrap_or(1);
-    // About square, a little wider as rows are not full.
-    let width = ((1.05 * all as f64).sqrt() as u32).clamp(widest, PAGE.max(widest));
+    let width = ((1.05 * texels(charts) as f64).sqrt() as u32).clamp(widest, PAGE.max(widest));
     let mut order: Vec<usize> = (0..charts.len()).collect();
     order.sort_by_key(|&i| (std::cmp::Reverse(charts[i].size[1]), std::cmp::Reverse(charts[i].size[0]), i));
-    let mut pages: Vec<[u32; 2]> = Vec::new();
-    // Where the next chart goes, and the height of its row.
-    let (mut x, mut y, mut height) = (0, 0, 0);
-    for i in order {
-        let [w, h] = charts[i].size;
-        if x + w > width {
-            (x, y, height) = (0, y + height, 0);
-        }
-        if pages.is_empty() || y + h > PAGE {
-            pages.push([0, 0]);
-            (x, y, height) = (0, 0, 0);
-        }
-        charts[i].page = pages.len() - 1;
-        charts[i].at = [x, y];
-        x += w;
-        height = height.max(h);
-        if let Some(page) = pages.last_mut() {
-            *page = [page[0].max(x), page[1].max(y + h)];
-        }
+    let sizes: Vec<[u32; 2]> = order.iter().map(|&i| charts[i].size).collect();
+    let (places, pages) = pages::place(&sizes, width, PAGE);
+    for (&i, (page, at)) in order.iter().zip(places) {
+        charts[i].page = page;
+        charts[i].at = at;
     }
     pages
+}
+
+/// Texels of all charts, their rims with them.
+fn texels(charts: &[Chart]) -> u64 {
+    charts.iter().map(|c| u64::from(c.size[0]) * u64::from(c.size[1])).sum()
 }
 
 #[cfg(test)]
@@ -271,7 +241,7 @@ mod tests {
     use super::*;
 
     /// A bent sheet: flat, then upright.
-    fn corner() -> Mesh {
+    fn corner() -> SurfaceMesh {
         let positions: Vec<Local> = (0..33)
             .map(|i| {
                 let (along, across) = (0.1 * (i / 3) as f32, 0.2 * (i % 3) as f32);
@@ -282,13 +252,13 @@ mod tests {
             let a = i / 2 * 3 + i % 2;
             [[a, a + 3, a + 4], [a, a + 4, a + 1]]
         };
-        Mesh { positions, triangles: (0..20).flat_map(quad).collect() }
+        SurfaceMesh { positions, triangles: (0..20).flat_map(quad).collect() }
     }
 
     #[test]
     fn a_corner_becomes_two_charts_that_share_no_texel() {
         let room = [Local::x(), Local::y(), Local::z()];
-        let mut charts = of_mesh(&corner(), &room);
+        let mut charts = of_mesh(&corner(), &room, 0.0025);
         assert_eq!(charts.len(), 2);
         assert_eq!(charts.iter().map(|c| c.triangles.len()).sum::<usize>(), 40);
         let pages = pack(&mut charts, 0.01, 1 << 20);
@@ -308,10 +278,20 @@ mod tests {
     #[test]
     fn texels_grow_until_all_fit() {
         let room = [Local::x(), Local::y(), Local::z()];
-        let mut charts = of_mesh(&corner(), &room);
+        let mut charts = of_mesh(&corner(), &room, 0.0025);
         pack(&mut charts, 0.0005, 5000);
         let all: u32 = charts.iter().map(|c| c.size[0] * c.size[1]).sum();
         assert!(all <= 5000 && all > 2500, "{all}");
         assert!(charts[0].texel > 0.005);
+    }
+
+    #[test]
+    fn texels_are_no_finer_than_what_frames_show() {
+        let room = [Local::x(), Local::y(), Local::z()];
+        let mut charts = of_mesh(&corner(), &room, 0.0025);
+        charts[0].finest = 0.02;
+        pack(&mut charts, 0.004, 1 << 20);
+        assert!((charts[0].texel - 0.02).abs() < 1e-6, "{}", charts[0].texel);
+        assert!((charts[1].texel - 0.004).abs() < 1e-6, "{}", charts[1].texel);
     }
 }

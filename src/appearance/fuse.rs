@@ -4,9 +4,11 @@
 //! sums on any number of threads.
 
 use rayon::prelude::*;
+use wide::f32x8;
 
-use super::Local;
-use super::sights::Sight;
+use super::frame_sights::FrameSight;
+use super::local::Local;
+use super::sight_camera::SightCamera;
 use crate::config;
 
 /// Voxels along the edge of a block.
@@ -21,12 +23,12 @@ const FREE_WEIGHT: f32 = 0.3;
 const SURE_M: f32 = 0.5;
 
 /// A block by its index: block (0, 0, 0) has its lower corner at the local origin.
-pub(super) type Index = [i32; 3];
+pub(super) type BlockIndex = [i32; 3];
 
 /// A cube of voxels.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Block {
-    pub(super) index: Index,
+pub(super) struct VoxelBlock {
+    pub(super) index: BlockIndex,
     /// Signed distance in metres, positive on the side that cameras were on, and its weight; x runs fastest.
     pub(super) voxels: Vec<[f32; 2]>,
 }
@@ -37,13 +39,21 @@ pub(super) struct Volume {
     /// Edge of a voxel, metres.
     pub(super) voxel: f32,
     /// By index, ascending.
-    pub(super) blocks: Vec<Block>,
+    pub(super) blocks: Vec<VoxelBlock>,
 }
 
 impl Volume {
     /// Position of a block in the list.
-    pub(super) fn find(&self, index: &Index) -> Option<usize> {
+    pub(super) fn find(&self, index: &BlockIndex) -> Option<usize> {
         self.blocks.binary_search_by(|b| b.index.cmp(index)).ok()
+    }
+
+    /// The weight of the voxel that is nearest to a place; 0 where there is none.
+    pub(super) fn weight(&self, p: &Local) -> f32 {
+        let at = [p.x, p.y, p.z].map(|c| (c / self.voxel - 0.5).round() as i32);
+        let [x, y, z] = at.map(|c| c.rem_euclid(SIDE as i32) as usize);
+        let block = self.find(&at.map(|c| c.div_euclid(SIDE as i32))).and_then(|b| self.blocks.get(b));
+        block.and_then(|b| b.voxels.get((z * SIDE + y) * SIDE + x)).map_or(0.0, |voxel| voxel[1])
     }
 
     /// Where a voxel of the whole grid is, counted from the origin.
@@ -53,7 +63,7 @@ impl Volume {
 }
 
 /// Fuses frames. Voxels are as large as asked for, or as what was seen needs to fit into the budget.
-pub(super) fn fuse(sights: &[Sight], config: &config::Appearance) -> Volume {
+pub(super) fn fuse(sights: &[FrameSight], config: &config::Appearance) -> Volume {
     let most = (config.fuse_mb * 1e6 / (VOXEL_BYTES * COUNT) as f64) as usize;
     let mut voxel = config.voxel_m as f32;
     let reach = |voxel: f32| (config.truncation_m as f32).max(3.0 * voxel);
@@ -72,12 +82,12 @@ pub(super) fn fuse(sights: &[Sight], config: &config::Appearance) -> Volume {
 }
 
 /// Blocks within `reach` of what any frame sees of the room, ascending.
-fn touched(sights: &[Sight], voxel: f32, reach: f32) -> Vec<Index> {
+fn touched(sights: &[FrameSight], voxel: f32, reach: f32) -> Vec<BlockIndex> {
     let edge = voxel * SIDE as f32;
-    let mut all: Vec<Index> = Vec::new();
+    let mut all: Vec<BlockIndex> = Vec::new();
     // In pieces: the same blocks are seen again and again.
     for some in sights.chunks(32) {
-        let by_sight: Vec<Vec<Index>> = some.par_iter().map(|sight| touched_by(sight, edge, reach)).collect();
+        let by_sight: Vec<Vec<BlockIndex>> = some.par_iter().map(|sight| touched_by(sight, edge, reach)).collect();
         all.extend(by_sight.into_iter().flatten());
         all.par_sort_unstable();
         all.dedup();
@@ -85,7 +95,7 @@ fn touched(sights: &[Sight], voxel: f32, reach: f32) -> Vec<Index> {
     all
 }
 
-fn touched_by(sight: &Sight, edge: f32, reach: f32) -> Vec<Index> {
+fn touched_by(sight: &FrameSight, edge: f32, reach: f32) -> Vec<BlockIndex> {
     /// Further from the first camera nothing is of the room, in blocks.
     const FAR: f32 = 1e6;
     let lens = &sight.lens;
@@ -104,8 +114,8 @@ fn touched_by(sight: &Sight, edge: f32, reach: f32) -> Vec<Index> {
         .map(|i| ((2.0 * i as f32 / steps as f32 - 1.0) * reach, Local::zeros()))
         .chain(sides.map(|side| (0.0, side)))
         .collect();
-    let mut out: Vec<Index> = Vec::new();
-    let mut before: Vec<Index> = vec![[i32::MAX; 3]; places.len()];
+    let mut out: Vec<BlockIndex> = Vec::new();
+    let mut before: Vec<BlockIndex> = vec![[i32::MAX; 3]; places.len()];
     for y in (0..lens.height).step_by(stride) {
         for x in (0..lens.width).step_by(stride) {
             let index = y * lens.width + x;
@@ -118,7 +128,7 @@ fn touched_by(sight: &Sight, edge: f32, reach: f32) -> Vec<Index> {
                 if !p.iter().all(|c| c.abs() < FAR) {
                     continue;
                 }
-                let block: Index = [p.x, p.y, p.z].map(|c| c.floor() as i32);
+                let block: BlockIndex = [p.x, p.y, p.z].map(|c| c.floor() as i32);
                 if block != *last {
                     *last = block;
                     out.push(block);
@@ -132,7 +142,7 @@ fn touched_by(sight: &Sight, edge: f32, reach: f32) -> Vec<Index> {
 }
 
 /// A block after all frames; `None` where none sees it.
-fn integrated(index: Index, sights: &[Sight], voxel: f32, reach: f32) -> Option<Block> {
+fn integrated(index: BlockIndex, sights: &[FrameSight], voxel: f32, reach: f32) -> Option<VoxelBlock> {
     let edge = voxel * SIDE as f32;
     let corner = Local::from(index.map(|i| i as f32)) * edge;
     let middle = corner + Local::repeat(0.5 * edge);
@@ -153,31 +163,23 @@ fn integrated(index: Index, sights: &[Sight], voxel: f32, reach: f32) -> Option<
     for v in voxels.iter_mut().filter(|v| v[1] > 0.0) {
         v[0] /= v[1];
     }
-    Some(Block { index, voxels })
+    Some(VoxelBlock { index, voxels })
 }
 
 /// Adds a frame's weighted distances to the sums of a block's voxels; whether any was told something.
-fn add(sight: &Sight, corner: &Local, voxel: f32, reach: f32, voxels: &mut [[f32; 2]]) -> bool {
+fn add(sight: &FrameSight, corner: &Local, voxel: f32, reach: f32, voxels: &mut [[f32; 2]]) -> bool {
     let lens = &sight.lens;
-    let [fx, fy] = lens.focal;
-    // Half a pixel more: whole numbers are pixel centres.
-    let [cx, cy] = lens.center.map(|c| c + 0.5);
     let [width, height] = [lens.width as f32, lens.height as f32];
     let first = sight.pose.apply(&(corner + Local::repeat(0.5 * voxel)));
     let step = |k: usize| -> Local { sight.pose.rotation.column(k) * voxel };
     let (dx, dy, dz) = (step(0), step(1), step(2));
     let mut any = false;
     for (row, line) in voxels.chunks_exact_mut(SIDE).enumerate() {
-        let mut p = first + dy * (row % SIDE) as f32 + dz * (row / SIDE) as f32;
-        for sum in line {
-            let (x, y, z) = (p.x, p.y, p.z);
-            p += dx;
-            if z < 0.05 {
-                continue;
-            }
-            let inverse = 1.0 / z;
-            let (u, v) = (fx * x * inverse + cx, fy * y * inverse + cy);
-            if !(u >= 0.0 && v >= 0.0 && u < width && v < height) {
+        let start = first + dy * (row % SIDE) as f32 + dz * (row / SIDE) as f32;
+        let [us, vs, zs] = projected(lens, &start, &dx);
+        for (i, sum) in line.iter_mut().enumerate() {
+            let (u, v, z) = (us[i], vs[i], zs[i]);
+            if z < 0.05 || !(u >= 0.0 && v >= 0.0 && u < width && v < height) {
                 continue;
             }
             let sample = sight.samples[v as usize * lens.width + u as usize];
@@ -200,4 +202,43 @@ fn add(sight: &Sight, corner: &Local, voxel: f32, reach: f32, voxels: &mut [[f32
         }
     }
     any
+}
+
+/// Column, row and depth of a line of voxels in the samples' camera, several at a time; columns and rows are whole within a pixel.
+fn projected(lens: &SightCamera, start: &Local, step: &Local) -> [[f32; SIDE]; 3] {
+    let steps = f32x8::from([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+    let along = |k: usize| f32x8::splat(start[k]) + f32x8::splat(step[k]) * steps;
+    let z = along(2);
+    let inverse = f32x8::splat(1.0) / z;
+    // Half a pixel more: whole numbers are pixel centres.
+    let pixel = |k: usize| along(k) * f32x8::splat(lens.focal[k]) * inverse + f32x8::splat(lens.center[k] + 0.5);
+    [pixel(0).to_array(), pixel(1).to_array(), z.to_array()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_of_voxels_is_seen_where_its_voxels_are() {
+        let lens = SightCamera { width: 640, height: 480, focal: [390.0, 400.0], center: [319.5, 239.5] };
+        let (start, step) = (Local::new(0.3, -0.2, 2.0), Local::new(0.006, 0.003, -0.007));
+        let [us, vs, zs] = projected(&lens, &start, &step);
+        for (i, ((column, row), depth)) in us.iter().zip(&vs).zip(&zs).enumerate() {
+            let p = start + step * i as f32;
+            let [u, v] = lens.project(&p).map(|c| c + 0.5);
+            assert!((column - u).abs() < 1e-3 && (row - v).abs() < 1e-3 && (depth - p.z).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_place_has_the_weight_of_its_nearest_voxel() {
+        let mut volume = Volume { voxel: 0.1, blocks: Vec::new() };
+        let mut voxels = vec![[0.0, 1.0]; COUNT];
+        voxels[SIDE - 1] = [0.0, 5.0];
+        volume.blocks.push(VoxelBlock { index: [-1, 0, 0], voxels });
+        assert_eq!(volume.weight(&Local::new(-0.06, 0.04, 0.09)), 5.0);
+        assert_eq!(volume.weight(&Local::new(-0.16, 0.04, 0.09)), 1.0);
+        assert_eq!(volume.weight(&Local::new(0.06, 0.04, 0.09)), 0.0);
+    }
 }

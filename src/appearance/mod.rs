@@ -4,55 +4,43 @@
 //! which everything stands closed and nobody works come first; frames in which a part stands open show what is behind it. Points
 //! that lie on a part, wherever it is in a frame, are the part's and not the room's, so that an open door has its inside behind it
 //! and not its own front. Everything is computed relative to the first camera, in `f32`.
+//!
+//! The surface loses what noise made of it (`clean`), then vertices (`coarse`, `simplify`), and is laid flat in few charts
+//! (`regions`) whose texels are as fine as the frames that show them (`density`).
 
 mod blend;
 mod boxes;
 mod charts;
-mod frames;
+mod clean;
+mod coarse;
+mod density;
+mod frame_choice;
+mod frame_sights;
 mod fuse;
-mod mesh;
-mod parts;
-mod sights;
+mod local;
+mod pages;
+mod part_charts;
+mod regions;
+mod sight_camera;
 mod simplify;
+mod surface_mesh;
+mod texels;
 mod texture;
-
-use nalgebra::{Matrix3, Vector3};
 
 use crate::config;
 use crate::error::Result;
 use crate::look::{Look, Texture, TexturedMesh};
-use crate::math::{Point, Pose};
+use crate::math::Point;
 use crate::pipeline::Scene;
-use crate::recording::Recording;
+use crate::recording::{Recording, Surfaces};
 use crate::twin::Twin;
 use charts::Chart;
-
-/// A point or direction relative to the first camera, metres.
-type Local = Vector3<f32>;
-
-/// A rigid motion in single precision.
-#[derive(Debug, Clone, Copy)]
-struct Motion {
-    rotation: Matrix3<f32>,
-    translation: Local,
-}
-
-impl Motion {
-    fn of(pose: &Pose) -> Self {
-        let rotation = pose.rotation.to_rotation_matrix().into_inner().map(|c| c as f32);
-        Self { rotation, translation: pose.translation.vector.map(|c| c as f32) }
-    }
-
-    fn apply(&self, p: &Local) -> Local {
-        self.rotation * p + self.translation
-    }
-}
 
 /// Why a recording gives no look, or one without colours; `None` where nothing is missing.
 #[must_use]
 pub fn lacking(recording: &Recording) -> Option<&'static str> {
     let any = |has: fn(&Recording, usize) -> bool| (0..recording.frames.len()).any(|f| has(recording, f));
-    if !any(|r, f| r.has_depth(f)) {
+    if recording.surfaces() < Surfaces::Depth {
         return Some("no frame has depth: the twin keeps its plain boxes");
     }
     (!any(|r, f| r.frames.get(f).is_some_and(|f| f.files.rgb.is_some())))
@@ -65,21 +53,30 @@ pub fn lacking(recording: &Recording) -> Option<&'static str> {
 /// # Errors
 /// Images that cannot be decoded.
 pub fn look(recording: &Recording, scene: &Scene, twin: &Twin, config: &config::Appearance) -> Result<Look> {
-    let timelines = frames::timelines(recording, scene);
-    let chosen = frames::choose(recording, scene, &timelines, config);
+    // Through the holes of a sparse reconstruction shows what is behind it.
+    if recording.surfaces() < Surfaces::Depth {
+        return Ok(Look::default());
+    }
+    let timelines = scene.timelines(recording);
+    let chosen = frame_choice::choose(recording, scene, &timelines, config);
     let Some(origin) = chosen.first().and_then(|f| recording.frames.get(*f)).map(crate::recording::Frame::center)
     else {
         return Ok(Look::default());
     };
-    let setting = sights::Setting { recording, scene, twin, timelines: &timelines, origin, config };
-    let sights = sights::load(&setting, &chosen)?;
+    let setting = frame_sights::Setting { recording, scene, twin, timelines: &timelines, origin, config };
+    let sights = frame_sights::load(&setting, &chosen)?;
     if sights.is_empty() {
         return Ok(Look::default());
     }
     let volume = fuse::fuse(&sights, config);
-    let surface = mesh::without_shards(mesh::surface(&volume), config.shard_m2);
+    // Shards first: they have rims all around.
+    let surface = surface_mesh::without_shards(surface_mesh::surface(&volume), config.shard_m2);
+    let surface = clean::without_frays(surface, &volume, config);
+    let voxel = volume.voxel;
     drop(volume);
-    let surface = simplify::simplify(surface, config.triangles);
+    let surface = coarse::reduced(surface, voxel, config);
+    // Simplification takes sheets apart that only touch.
+    let surface = clean::without_shards(surface, twin, &origin, config);
     let up = recording.up();
     let axes = scene.manhattan.as_ref().map_or_else(
         || {
@@ -88,9 +85,9 @@ pub fn look(recording: &Recording, scene: &Scene, twin: &Twin, config: &config::
         },
         |m| m.axes,
     );
-    let mut all = charts::of_mesh(&surface, &axes.map(|a| a.map(|c| c as f32)));
+    let mut all = charts::of_mesh(&surface, &axes.map(|a| a.map(|c| c as f32)), config.chart_m2);
     drop(surface);
-    all.extend(parts::charts(twin, &origin, &sights));
+    all.extend(part_charts::charts(twin, &origin, &sights));
     let (textures, seen) = texture::paint(&setting, &sights, &mut all)?;
     Ok(gathered(&all, textures, &seen, twin, &origin))
 }
@@ -167,21 +164,21 @@ mod tests {
     use std::path::{Path, PathBuf};
 
     use super::*;
-    use crate::math::Vector;
+    use crate::math::{Pose, Vector};
     use crate::recording::{Camera, DepthFactors, Frame, FrameFiles};
-    use crate::synth::kitchen::Block;
+    use crate::synth::kitchen::ColoredBox;
     use crate::synth::render;
     use crate::twin::OrientedBox;
 
     const CAMERA: Camera = Camera { width: 240, height: 180, fx: 180.0, fy: 180.0, cx: 119.5, cy: 89.5 };
 
-    fn block(center: [f64; 3], half: [f64; 3], color: [u8; 3]) -> Block {
+    fn block(center: [f64; 3], half: [f64; 3], color: [u8; 3]) -> ColoredBox {
         let shape = OrientedBox {
             center: Point::from(center),
             half: Vector::from(half),
             rotation: nalgebra::Matrix3::identity(),
         };
-        Block { shape, color, class: 1 }
+        ColoredBox { shape, color, class: 1 }
     }
 
     fn looking(eye: [f64; 3], at: [f64; 3]) -> Pose {
@@ -195,7 +192,7 @@ mod tests {
     }
 
     /// A recording of blocks from some places; the exposure of each frame multiplies its colours.
-    fn recorded(dir: &Path, blocks: &[Block], views: &[(Pose, f64)], with_images: bool) -> Recording {
+    fn recorded(dir: &Path, blocks: &[ColoredBox], views: &[(Pose, f64)], with_images: bool) -> Recording {
         let mut frames = Vec::new();
         for (i, (pose, exposure)) in views.iter().enumerate() {
             let mut picture = render::cast(blocks, pose, &CAMERA);
@@ -216,17 +213,7 @@ mod tests {
             }
             frames.push(Frame { timestamp_secs: 0.1 * i as f64, world_from_camera: *pose, files });
         }
-        Recording {
-            name: "r".to_owned(),
-            dir: dir.to_owned(),
-            camera: CAMERA,
-            frames,
-            clips: Vec::new(),
-            hands: Vec::new(),
-            labels: Default::default(),
-            reconstruction: Vec::new(),
-            depth_factors: DepthFactors::default(),
-        }
+        Recording { name: "r".to_owned(), dir: dir.to_owned(), frames, ..Recording::empty(CAMERA) }
     }
 
     fn nothing_moves() -> (Scene, Twin) {
@@ -234,6 +221,7 @@ mod tests {
             recording: "r".to_owned(),
             manhattan: None,
             depth_factors: DepthFactors::default(),
+            videos: Default::default(),
             clips: Vec::new(),
             joints: Vec::new(),
             surroundings: None,
@@ -249,7 +237,7 @@ mod tests {
     }
 
     /// A floor and a box on all sides of which cameras stand.
-    fn box_in_the_air() -> (Vec<Block>, Vec<(Pose, f64)>) {
+    fn box_in_the_air() -> (Vec<ColoredBox>, Vec<(Pose, f64)>) {
         let blocks = vec![block([0.0, 0.0, 1.0], [0.3, 0.25, 0.2], [180, 90, 60])];
         let mut views = Vec::new();
         for height in [-0.2, 1.0, 2.2] {
@@ -275,7 +263,7 @@ mod tests {
         let (scene, twin) = nothing_moves();
         let config = config::Appearance::default();
         let origin = Point::origin();
-        let setting = sights::Setting {
+        let setting = frame_sights::Setting {
             recording: &recording,
             scene: &scene,
             twin: &twin,
@@ -283,9 +271,10 @@ mod tests {
             origin,
             config: &config,
         };
-        let sights = sights::load(&setting, &(0..views.len()).collect::<Vec<usize>>()).unwrap();
+        let sights = frame_sights::load(&setting, &(0..views.len()).collect::<Vec<usize>>()).unwrap();
         assert_eq!(sights.len(), 24);
-        let surface = mesh::without_shards(mesh::surface(&fuse::fuse(&sights, &config)), config.shard_m2);
+        let surface =
+            surface_mesh::without_shards(surface_mesh::surface(&fuse::fuse(&sights, &config)), config.shard_m2);
         let mut off: Vec<f64> =
             surface.positions.iter().map(|p| off_surface(&Point::from(p.map(f64::from)), &blocks[0].shape)).collect();
         off.sort_by(f64::total_cmp);
@@ -309,7 +298,7 @@ mod tests {
     }
 
     /// A wall of squares of 20 cm, dark and bright, and a step before it.
-    fn checkered() -> Vec<Block> {
+    fn checkered() -> Vec<ColoredBox> {
         let mut blocks = vec![block([0.0, -0.3, -0.1], [0.3, 0.3, 0.1], [120, 140, 100])];
         for x in -5..5 {
             for z in 0..8 {

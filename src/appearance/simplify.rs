@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-use super::mesh::Mesh;
+use super::surface_mesh::SurfaceMesh;
 
 /// Edge of the cubes, metres: some ten thousands of triangles each.
 const CUBE_M: f32 = 1.0;
@@ -77,12 +77,12 @@ impl Quadric {
 }
 
 /// At most so many triangles, or as few as can be had without a fold or a tear. Open edges stay where they are.
-pub(super) fn simplify(mesh: Mesh, budget: usize) -> Mesh {
+pub(super) fn simplify(mesh: SurfaceMesh, budget: usize) -> SurfaceMesh {
     if mesh.triangles.len() <= budget {
         return mesh;
     }
     let rough = (budget as f64 * ROUGH) as usize;
-    let mut mesh = mesh;
+    let mut mesh = cut_knots(mesh);
     if mesh.triangles.len() > 2 * rough {
         mesh = in_cubes(&mesh, rough);
     }
@@ -90,8 +90,59 @@ pub(super) fn simplify(mesh: Mesh, budget: usize) -> Mesh {
     reduced(mesh, &fast, budget)
 }
 
+/// Gives each sheet that meets others in a vertex a vertex of its own. Noisy surfaces touch themselves in thousands of places, and a
+/// vertex where sheets meet could not move.
+fn cut_knots(mut mesh: SurfaceMesh) -> SurfaceMesh {
+    let whole = mesh.triangles.clone();
+    let rings = Rings::of(&whole, mesh.positions.len());
+    for v in 0..mesh.positions.len() as u32 {
+        let ring = rings.around(v);
+        let fans = fans(&whole, ring, v);
+        for fan in 1..fans.iter().max().map_or(0, |last| last + 1) {
+            let copy = mesh.positions.len() as u32;
+            mesh.positions.push(mesh.positions[v as usize]);
+            for (i, _) in ring.iter().zip(&fans).filter(|(_, own)| **own == fan) {
+                mesh.triangles[*i as usize].iter_mut().filter(|w| **w == v).for_each(|w| *w = copy);
+            }
+        }
+    }
+    mesh
+}
+
+/// For each triangle around a vertex the number of its fan: triangles are of one where an edge that no third one has joins them.
+fn fans(triangles: &[[u32; 3]], ring: &[u32], vertex: u32) -> Vec<usize> {
+    let ends: Vec<[u32; 2]> = ring
+        .iter()
+        .map(|i| [before(&triangles[*i as usize], vertex), after(&triangles[*i as usize], vertex)])
+        .collect();
+    let once = |side: usize, w: u32| ends.iter().filter(|e| e[side] == w).count() == 1;
+    let joined = |x: usize, y: usize| {
+        let across = |from: [u32; 2], to: [u32; 2]| from[1] == to[0] && once(1, from[1]) && once(0, from[1]);
+        across(ends[x], ends[y]) || across(ends[y], ends[x])
+    };
+    let mut fan = vec![usize::MAX; ring.len()];
+    let mut count = 0;
+    for start in 0..ring.len() {
+        if fan[start] != usize::MAX {
+            continue;
+        }
+        let mut open = vec![start];
+        fan[start] = count;
+        while let Some(x) = open.pop() {
+            for (y, of) in fan.iter_mut().enumerate() {
+                if *of == usize::MAX && joined(x, y) {
+                    *of = count;
+                    open.push(y);
+                }
+            }
+        }
+        count += 1;
+    }
+    fan
+}
+
 /// Works on each cube alone.
-fn in_cubes(mesh: &Mesh, budget: usize) -> Mesh {
+fn in_cubes(mesh: &SurfaceMesh, budget: usize) -> SurfaceMesh {
     let mut cubes: BTreeMap<[i32; 3], Vec<u32>> = BTreeMap::new();
     for (i, t) in mesh.triangles.iter().enumerate() {
         let p = mesh.positions[t[0] as usize] / CUBE_M;
@@ -109,14 +160,14 @@ fn in_cubes(mesh: &Mesh, budget: usize) -> Mesh {
     }
     let share = budget as f64 / mesh.triangles.len() as f64;
     let lists: Vec<&Vec<u32>> = cubes.values().collect();
-    let parts: Vec<(Mesh, Vec<Option<u32>>)> = lists
+    let parts: Vec<(SurfaceMesh, Vec<Option<u32>>)> = lists
         .par_iter()
         .map(|list| {
             let mut vertices: Vec<u32> = list.iter().flat_map(|&i| mesh.triangles[i as usize]).collect();
             vertices.sort_unstable();
             vertices.dedup();
             let local = |v: u32| vertices.partition_point(|x| *x < v) as u32;
-            let part = Mesh {
+            let part = SurfaceMesh {
                 positions: vertices.iter().map(|&v| mesh.positions[v as usize]).collect(),
                 triangles: list.iter().map(|&i| mesh.triangles[i as usize].map(local)).collect(),
             };
@@ -129,7 +180,7 @@ fn in_cubes(mesh: &Mesh, budget: usize) -> Mesh {
         })
         .collect();
     // What cubes share gets one number.
-    let mut out = Mesh::default();
+    let mut out = SurfaceMesh::default();
     let mut number: BTreeMap<u32, u32> = BTreeMap::new();
     for (part, names) in parts {
         let numbers: Vec<u32> = part
@@ -150,12 +201,12 @@ fn in_cubes(mesh: &Mesh, budget: usize) -> Mesh {
     out.compacted()
 }
 
-fn reduced(mesh: Mesh, fast: &[bool], budget: usize) -> Mesh {
+fn reduced(mesh: SurfaceMesh, fast: &[bool], budget: usize) -> SurfaceMesh {
     passes(mesh, fast, budget).compacted()
 }
 
 /// Passes until the budget is met; vertices keep their numbers, and those that are `fast` their places.
-fn passes(mesh: Mesh, fast: &[bool], budget: usize) -> Mesh {
+fn passes(mesh: SurfaceMesh, fast: &[bool], budget: usize) -> SurfaceMesh {
     let Some(middle) = mesh.positions.first().copied() else { return mesh };
     // Near the middle of the numbers squares lose less.
     let mut work = Work {
@@ -177,7 +228,7 @@ fn passes(mesh: Mesh, fast: &[bool], budget: usize) -> Mesh {
         }
         share = if stuck { (2.0 * share).min(1.0) } else { SHARE };
     }
-    Mesh {
+    SurfaceMesh {
         positions: work.positions.iter().map(|p: &Vector3<f64>| p.map(|c| c as f32) + middle).collect(),
         triangles: work.triangles,
     }
@@ -440,10 +491,10 @@ impl Work {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::appearance::Local;
+    use crate::appearance::local::Local;
 
     /// A square of 1.5 m in the plane z = 0.3 x in steps of a centimetre.
-    fn plane() -> Mesh {
+    fn plane() -> SurfaceMesh {
         const N: u32 = 150;
         let at = |i: u32| {
             let (x, y) = (0.01 * (i % (N + 1)) as f32, 0.01 * (i / (N + 1)) as f32);
@@ -453,11 +504,14 @@ mod tests {
             let a = i / N * (N + 1) + i % N;
             [[a, a + 1, a + N + 2], [a, a + N + 2, a + N + 1]]
         };
-        Mesh { positions: (0..(N + 1) * (N + 1)).map(at).collect(), triangles: (0..N * N).flat_map(quad).collect() }
+        SurfaceMesh {
+            positions: (0..(N + 1) * (N + 1)).map(at).collect(),
+            triangles: (0..N * N).flat_map(quad).collect(),
+        }
     }
 
     /// Whether only the square's own four sides are open.
-    fn is_whole(mesh: &Mesh) -> bool {
+    fn is_whole(mesh: &SurfaceMesh) -> bool {
         let mut edges = std::collections::BTreeMap::<[u32; 2], i32>::new();
         for t in &mesh.triangles {
             for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
@@ -472,7 +526,7 @@ mod tests {
         edges.iter().filter(|(_, sum)| **sum != 0).all(|([a, b], _)| at_side(*a) && at_side(*b))
     }
 
-    fn area(mesh: &Mesh) -> f32 {
+    fn area(mesh: &SurfaceMesh) -> f32 {
         mesh.triangles.iter().map(|t| 0.5 * mesh.across(t).norm()).sum()
     }
 
@@ -489,6 +543,19 @@ mod tests {
             assert!(is_whole(&few), "torn between cubes");
         }
         assert_eq!(simplify(whole.clone(), 45_000), whole);
+    }
+
+    #[test]
+    fn sheets_that_touch_in_a_vertex_are_parted_and_others_are_not() {
+        let point = |x: f32, y: f32| Local::new(x, y, 0.0);
+        // Two triangles at one corner, and two that share an edge.
+        let positions = vec![point(0.0, 0.0), point(1.0, 0.0), point(1.0, 1.0), point(-1.0, 0.0), point(-1.0, -1.0)];
+        let touching = SurfaceMesh { positions: positions.clone(), triangles: vec![[0, 1, 2], [0, 3, 4]] };
+        let cut = cut_knots(touching);
+        assert_eq!((cut.positions.len(), cut.triangles), (6, vec![[0, 1, 2], [5, 3, 4]]));
+        let joined = SurfaceMesh { positions, triangles: vec![[0, 1, 2], [0, 2, 3]] };
+        assert_eq!(cut_knots(joined.clone()), joined);
+        assert_eq!(cut_knots(plane()), plane());
     }
 
     #[test]

@@ -3,11 +3,12 @@
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 
-use super::blend;
 use super::charts::{self, Chart};
-use super::frames::State;
-use super::sights::{Setting, Sight};
-use super::{Local, Motion};
+use super::frame_choice::State;
+use super::frame_sights::{FrameSight, Setting};
+use super::local::{Local, RigidMotion};
+use super::texels::{BEST, LEAST_COSINE, Texel, TexelSample, TexelTile, name, pose_of, tolerance};
+use super::{blend, density};
 use crate::error::Result;
 use crate::look::Texture;
 use crate::math::Pose;
@@ -15,61 +16,17 @@ use crate::recording::Grid;
 
 /// Edge of a tile, texels.
 const TILE: u32 = 16;
-/// Frames that a texel keeps.
-pub(super) const BEST: usize = 4;
 /// Frames that are decoded at a time.
 const WINDOW: usize = 4;
-/// A surface seen at less than this slant (cosine) is smeared.
-const LEAST_COSINE: f32 = 0.15;
 /// Nearer than this an image is no sharper, metres.
 const SHARP_M: f32 = 0.3;
-/// How far a surface may be from what a frame's depth shows, to be what is seen there: metres, and a share of the depth. Parts
-/// are boxes, and further from what was seen than the room's own mesh.
-const ROOM_OFF: [f32; 2] = [0.02, 0.02];
-const PART_OFF: [f32; 2] = [0.045, 0.02];
 /// Colour where there are no images, sRGB.
 const GREY: u8 = 170;
-
-/// What a frame says of a texel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Sample {
-    /// How good the frame is for the texel, on a scale of its own; 0 = no sample.
-    pub(super) score: u16,
-    /// Position of the frame among the sights.
-    pub(super) sight: u16,
-    pub(super) rgb: [u8; 3],
-}
-
-/// A texel that a triangle covers.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Texel {
-    /// On the chart.
-    pub(super) at: [u16; 2],
-    /// Out of the chart's plane, metres from the local origin.
-    height: f32,
-    /// Unit normal by 127ths.
-    normal: [i8; 3],
-    pub(super) samples: [Sample; BEST],
-}
-
-/// Texels of a square of a chart.
-#[derive(Debug, Clone)]
-pub(super) struct Tile {
-    pub(super) chart: usize,
-    middle: Local,
-    radius: f32,
-    /// Mean normal, and the angle within which all of them are, radians.
-    normal: Local,
-    spread: f32,
-    /// The least score that any of its texels has kept.
-    least: u16,
-    pub(super) texels: Vec<Texel>,
-}
 
 /// Packs the charts and paints them. Returns the pages, and of each chart how many texels were seen and how many it has.
 pub(super) fn paint(
     setting: &Setting,
-    sights: &[Sight],
+    sights: &[FrameSight],
     charts: &mut [Chart],
 ) -> Result<(Vec<Texture>, Vec<[usize; 2]>)> {
     let has_colours =
@@ -77,19 +34,22 @@ pub(super) fn paint(
     if !has_colours {
         return Ok((grey(charts), vec![[0, 1]; charts.len()]));
     }
+    let motions: Vec<Vec<Option<RigidMotion>>> = sights.iter().map(|sight| motions(setting, sight)).collect();
+    density::choose(charts, sights, &motions, setting.config);
     let pages = charts::pack(charts, setting.config.texel_m, setting.config.texels);
     let mut tiles = tiles(charts);
-    for (number, some) in sights.chunks(WINDOW).enumerate() {
+    for (number, (some, motions)) in sights.chunks(WINDOW).zip(motions.chunks(WINDOW)).enumerate() {
         let images: Vec<Option<Grid<[u8; 3]>>> =
             some.par_iter().map(|s| setting.recording.rgb(s.frame)).collect::<Result<_>>()?;
-        let views: Vec<View> = some
+        let views: Vec<PaintedView> = some
             .iter()
             .zip(&images)
+            .zip(motions)
             .enumerate()
-            .filter_map(|(i, (sight, image))| {
+            .filter_map(|(i, ((sight, image), motions))| {
                 let image = image.as_ref()?;
                 let number = (number * WINDOW + i) as u16;
-                Some(View { sight, number, image, sharpness: sharpness(image), motions: motions(setting, sight) })
+                Some(PaintedView { sight, number, image, sharpness: sharpness(image), motions })
             })
             .collect();
         tiles.par_iter_mut().for_each(|tile| {
@@ -112,23 +72,18 @@ fn grey(charts: &mut [Chart]) -> Vec<Texture> {
     vec![Texture { name: name(0), width: SIZE, height: SIZE, rgb: vec![GREY; (3 * SIZE * SIZE) as usize] }]
 }
 
-/// Name of a page.
-pub(super) fn name(page: usize) -> String {
-    format!("look_{page}")
-}
-
 /// A frame with its image.
-struct View<'a> {
-    sight: &'a Sight,
+struct PaintedView<'a> {
+    sight: &'a FrameSight,
     number: u16,
     image: &'a Grid<[u8; 3]>,
     sharpness: f32,
     /// Camera from local of each part where it is known where it stands.
-    motions: Vec<Option<Motion>>,
+    motions: &'a [Option<RigidMotion>],
 }
 
 /// Where each part is, seen from the camera.
-fn motions(setting: &Setting, sight: &Sight) -> Vec<Option<Motion>> {
+fn motions(setting: &Setting, sight: &FrameSight) -> Vec<Option<RigidMotion>> {
     let from = Pose::translation(setting.origin.x, setting.origin.y, setting.origin.z);
     let part = |(piece, state): (&crate::twin::Furniture, &State)| {
         let opening = match state {
@@ -137,8 +92,8 @@ fn motions(setting: &Setting, sight: &Sight) -> Vec<Option<Motion>> {
             State::Moving => return None,
         };
         // Local from local: the motion is about the world's origin.
-        let moved = Motion::of(&(from.inverse() * piece.part.joint.articulation.motion(opening) * from));
-        Some(Motion {
+        let moved = RigidMotion::of(&(from.inverse() * piece.part.joint.articulation.motion(opening) * from));
+        Some(RigidMotion {
             rotation: sight.pose.rotation * moved.rotation,
             translation: sight.pose.apply(&moved.translation),
         })
@@ -164,8 +119,8 @@ fn sharpness(image: &Grid<[u8; 3]>) -> f32 {
 }
 
 /// The tiles of all charts, in their order.
-fn tiles(charts: &[Chart]) -> Vec<Tile> {
-    let by_chart: Vec<Vec<Tile>> = charts
+fn tiles(charts: &[Chart]) -> Vec<TexelTile> {
+    let by_chart: Vec<Vec<TexelTile>> = charts
         .par_iter()
         .enumerate()
         .map(|(i, chart)| if chart.assumed.is_some() { Vec::new() } else { tiles_of(i, chart) })
@@ -173,7 +128,7 @@ fn tiles(charts: &[Chart]) -> Vec<Tile> {
     by_chart.into_iter().flatten().collect()
 }
 
-fn tiles_of(number: usize, chart: &Chart) -> Vec<Tile> {
+fn tiles_of(number: usize, chart: &Chart) -> Vec<TexelTile> {
     let across = chart.size[0].div_ceil(TILE) as usize;
     let down = chart.size[1].div_ceil(TILE) as usize;
     let mut tiles: Vec<Vec<Texel>> = vec![Vec::new(); across * down];
@@ -189,7 +144,7 @@ fn tiles_of(number: usize, chart: &Chart) -> Vec<Tile> {
                 at: at.map(|c| c as u16),
                 height,
                 normal: [normal.x, normal.y, normal.z].map(|c| (127.0 * c).round() as i8),
-                samples: [Sample::default(); BEST],
+                samples: [TexelSample::default(); BEST],
             });
         });
     }
@@ -201,7 +156,7 @@ fn tiles_of(number: usize, chart: &Chart) -> Vec<Tile> {
         let sum = normals.iter().fold(Local::zeros(), |sum, n| sum + n);
         let normal = sum.try_normalize(1e-6).unwrap_or(chart.axes[2]);
         let spread = normals.iter().map(|n| n.dot(&normal).clamp(-1.0, 1.0).acos()).fold(0.0, f32::max);
-        Tile { chart: number, middle, radius, normal, spread, least: 0, texels }
+        TexelTile { chart: number, middle, radius, normal, spread, least: 0, texels }
     };
     tiles.into_iter().filter(|t| !t.is_empty()).map(whole).collect()
 }
@@ -255,20 +210,13 @@ fn cover(chart: &Chart, triangle: &[u32; 3], take: &mut impl FnMut([u32; 2], f32
 }
 
 /// Lets a frame say what it shows at a tile's texels.
-fn look_at(tile: &mut Tile, chart: &Chart, view: &View) {
+fn look_at(tile: &mut TexelTile, chart: &Chart, view: &PaintedView) {
     let sight = view.sight;
-    let pose = match chart.owner {
-        None => sight.pose,
-        Some(part) => match view.motions.get(part) {
-            Some(Some(pose)) => *pose,
-            _ => return,
-        },
-    };
+    let Some(pose) = pose_of(chart.owner, sight, view.motions) else { return };
     let middle = pose.apply(&tile.middle);
     if !sight.lens.meets(&middle, tile.radius) || no_use(tile, &pose, &middle, view) {
         return;
     }
-    let off = if chart.owner.is_some() { PART_OFF } else { ROOM_OFF };
     let axes: [Local; 3] = chart.axes.map(|axis| pose.rotation * axis);
     let base = pose.translation + axes[0] * chart.low[0] + axes[1] * chart.low[1];
     let (right, down) = (axes[0] * chart.texel, axes[1] * chart.texel);
@@ -286,7 +234,7 @@ fn look_at(tile: &mut Tile, chart: &Chart, view: &View) {
             continue;
         }
         let at = sight.lens.project(&p);
-        let tolerance = off[0] + off[1] * p.z;
+        let tolerance = tolerance(chart.owner, p.z);
         let Some(agreement) = sight.agrees(at, p.z, tolerance, chart.owner.is_none()) else { continue };
         // Lenses are worse at the rim, and what is corrected there is stretched.
         let rim = (at[0].min(width - at[0]) / width).min(at[1].min(height - at[1]) / height);
@@ -299,7 +247,7 @@ fn look_at(tile: &mut Tile, chart: &Chart, view: &View) {
 }
 
 /// Whether a view has nothing to say of a tile: it looks away, is hidden, or all of its texels have better ones.
-fn no_use(tile: &Tile, pose: &Motion, middle: &Local, view: &View) -> bool {
+fn no_use(tile: &TexelTile, pose: &RigidMotion, middle: &Local, view: &PaintedView) -> bool {
     let away = middle.norm();
     if away <= 2.0 * tile.radius {
         return false;
@@ -322,7 +270,7 @@ fn ranked(score: f32) -> u16 {
 }
 
 /// Keeps a sample if it is among the best.
-fn keep(texel: &mut Texel, score: f32, view: &View, at: [f32; 2]) {
+fn keep(texel: &mut Texel, score: f32, view: &PaintedView, at: [f32; 2]) {
     let score = ranked(score);
     let Some(worst) = texel.samples.iter_mut().min_by_key(|s| s.score) else { return };
     if worst.score >= score {
@@ -330,7 +278,7 @@ fn keep(texel: &mut Texel, score: f32, view: &View, at: [f32; 2]) {
     }
     let step = view.sight.step as f32;
     let first = (view.sight.step / 2) as f32;
-    *worst = Sample { score, sight: view.number, rgb: bilinear(view.image, at.map(|c| c * step + first)) };
+    *worst = TexelSample { score, sight: view.number, rgb: bilinear(view.image, at.map(|c| c * step + first)) };
 }
 
 /// Colour between pixels.

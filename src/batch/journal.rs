@@ -30,9 +30,9 @@ impl Status {
 
 /// What a result was made of: another key is another result.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Key {
-    /// The recording's folder, as the system resolves it.
-    pub recording: String,
+pub struct JournalKey {
+    /// The recordings' folders, as the system resolves them.
+    pub recordings: Vec<String>,
     /// Hash of all parameters.
     pub config: String,
     /// Version of `paws`.
@@ -41,12 +41,12 @@ pub struct Key {
 
 /// One finished recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Entry {
+pub struct JournalEntry {
     /// Its name.
     pub name: String,
     /// What it was made of.
     #[serde(flatten)]
-    pub key: Key,
+    pub key: JournalKey,
     /// How it ended.
     pub status: Status,
     /// Exit code; `None` where it was ended by a signal, or never begun.
@@ -61,7 +61,7 @@ pub struct Entry {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Journal {
     /// Entries by name; of several the last.
-    pub entries: BTreeMap<String, Entry>,
+    pub entries: BTreeMap<String, JournalEntry>,
     /// Bytes that are whole lines; what follows was cut off by the end of a run.
     pub whole_bytes: usize,
     /// Numbers of lines, from 1, that are no entries.
@@ -75,7 +75,7 @@ pub fn parse(bytes: &[u8]) -> Journal {
     let mut journal = Journal { whole_bytes, ..Journal::default() };
     let whole = bytes.get(..whole_bytes).unwrap_or_default();
     for (i, line) in whole.split(|b| *b == b'\n').enumerate().filter(|(_, line)| !line.is_empty()) {
-        match serde_json::from_slice::<Entry>(line) {
+        match serde_json::from_slice::<JournalEntry>(line) {
             Ok(entry) => {
                 journal.entries.insert(entry.name.clone(), entry);
             }
@@ -89,7 +89,7 @@ pub fn parse(bytes: &[u8]) -> Journal {
 ///
 /// # Errors
 /// Where it cannot be written as JSON, which would be a bug.
-pub fn line(entry: &Entry) -> serde_json::Result<String> {
+pub fn line(entry: &JournalEntry) -> serde_json::Result<String> {
     serde_json::to_string(entry).map(|text| text + "\n")
 }
 
@@ -97,9 +97,9 @@ pub fn line(entry: &Entry) -> serde_json::Result<String> {
 mod tests {
     use super::*;
 
-    fn entry(name: &str, status: Status) -> Entry {
-        let key = Key { recording: "/r".to_owned(), config: "c".to_owned(), version: "1".to_owned() };
-        Entry { name: name.to_owned(), key, status, code: Some(0), reason: "two\nlines".to_owned(), secs: 1.5 }
+    fn entry(name: &str, status: Status) -> JournalEntry {
+        let key = JournalKey { recordings: vec!["/r".to_owned()], config: "c".to_owned(), version: "1".to_owned() };
+        JournalEntry { name: name.to_owned(), key, status, code: Some(0), reason: "two\nlines".to_owned(), secs: 1.5 }
     }
 
     #[test]

@@ -5,4 +5,4 @@
 pub mod estimate;
 pub mod journal;
 pub mod manifest;
-pub mod tables;
+pub mod result_tables;

@@ -12,7 +12,7 @@ use super::output::write_file;
 use super::words::{self as model, Asked, WordsArgs};
 use super::{Answer, Opening, evaluate as truth, print, shown};
 use crate::config::Config;
-use crate::evaluation::{Paired, Predictions, Report, Rule, compare, evaluate};
+use crate::evaluation::{EvaluationReport, Paired, Predictions, Rule, Truth, compare, evaluate};
 use crate::json;
 use crate::recording::Recording;
 use crate::report::accuracy;
@@ -20,10 +20,11 @@ use crate::report::table::aligned;
 use crate::vlm::Usage;
 
 /// The configurations that are compared where none are named.
-const BUILT_IN: [(&str, &str); 22] = [
+const BUILT_IN: [(&str, &str); 25] = [
     ("ours", include_str!("../../examples/ablations/ours.toml")),
     ("ours_clustered_room", include_str!("../../examples/ablations/ours_clustered_room.toml")),
     ("ours_no_closed_state", include_str!("../../examples/ablations/ours_no_closed_state.toml")),
+    ("ours_no_contact_from_depth", include_str!("../../examples/ablations/ours_no_contact_from_depth.toml")),
     ("ours_no_depth_scale", include_str!("../../examples/ablations/ours_no_depth_scale.toml")),
     ("ours_no_face_normal", include_str!("../../examples/ablations/ours_no_face_normal.toml")),
     ("ours_no_feedback", include_str!("../../examples/ablations/ours_no_feedback.toml")),
@@ -33,6 +34,8 @@ const BUILT_IN: [(&str, &str); 22] = [
     ("ours_no_occlusion", include_str!("../../examples/ablations/ours_no_occlusion.toml")),
     ("ours_no_second_look", include_str!("../../examples/ablations/ours_no_second_look.toml")),
     ("ours_paper_rule", include_str!("../../examples/ablations/ours_paper_rule.toml")),
+    ("ours_uninformed_no_names", include_str!("../../examples/ablations/ours_uninformed_no_names.toml")),
+    ("ours_uninformed_priors", include_str!("../../examples/ablations/ours_uninformed_priors.toml")),
     ("ours_unprojected_lines", include_str!("../../examples/ablations/ours_unprojected_lines.toml")),
     ("ours_untempered", include_str!("../../examples/ablations/ours_untempered.toml")),
     ("paper", include_str!("../../examples/ablations/paper.toml")),
@@ -69,7 +72,7 @@ pub struct AblateArgs {
 #[derive(Serialize)]
 struct Row {
     config: String,
-    report: Report,
+    report: EvaluationReport,
     /// The difference to the first configuration.
     #[serde(skip_serializing_if = "Option::is_none")]
     against_first: Option<Vec<Paired>>,
@@ -81,9 +84,8 @@ pub fn run(args: &AblateArgs) -> anyhow::Result<Answer> {
     if asked.as_ref().is_some_and(Asked::is_dry) {
         bail!("--dry-run counts for one configuration: use it with `paws infer --config FILE`");
     }
-    // All are opened before the first is worked on; what the inference sees of them holds no truth.
-    let opened: Vec<Recording> = args.recordings.iter().map(|f| args.opening.open(f)).collect::<Result<_, _>>()?;
-    let truths = truth::truths(&args.recordings)?;
+    let (opened, truths) = args.opened()?;
+    let mut whole = opened.len() == args.recordings.len();
     if truths.iter().all(|t| t.clips.values().all(Option::is_none)) {
         bail!("no clip of these recordings moves a joint: there is nothing to compare");
     }
@@ -93,7 +95,16 @@ pub fn run(args: &AblateArgs) -> anyhow::Result<Answer> {
         eprintln!("{config} ...");
         let mut all = Predictions::default();
         for recording in &opened {
-            let predicted = predict(recording, &values, asked.as_ref())?;
+            let predicted = match predict(recording, &values, asked.as_ref(), None) {
+                Ok(predicted) => predicted,
+                Err(error) if opened.len() == 1 => return Err(error),
+                // Its clips have no answer then, which is wrong.
+                Err(error) => {
+                    eprintln!("no answer under {config}: {error:#}");
+                    whole = false;
+                    continue;
+                }
+            };
             total = model::added(total, predicted.usage);
             all.predictions.extend(predicted.predictions.predictions);
         }
@@ -108,7 +119,7 @@ pub fn run(args: &AblateArgs) -> anyhow::Result<Answer> {
     if let Some((asked, usage)) = asked.as_ref().zip(total) {
         eprintln!("{}", usage.sentence(asked.model()));
     }
-    Ok(Answer::Yes)
+    Ok(if whole { Answer::Yes } else { Answer::No })
 }
 
 /// A name and a file.
@@ -120,6 +131,16 @@ fn named(text: &str) -> Result<(String, PathBuf), String> {
 }
 
 impl AblateArgs {
+    /// The recordings that can be read, each with its truth, of which the inference sees nothing. One that cannot costs only itself.
+    fn opened(&self) -> anyhow::Result<(Vec<Recording>, Vec<Truth>)> {
+        let open = |folder: &Path| -> crate::error::Result<(Recording, Truth)> {
+            Ok((self.opening.open(folder)?, Truth::read(folder)?))
+        };
+        let (opened, truths): (Vec<_>, Vec<_>) = truth::opened(&self.recordings, open)?.into_iter().unzip();
+        truth::check_names(&truths)?;
+        Ok((opened, truths))
+    }
+
     /// The configurations in the order of the table.
     fn read(&self) -> anyhow::Result<Vec<(String, Config)>> {
         let mut all = Vec::new();

@@ -1,36 +1,37 @@
 //! `paws batch`: the twins of many recordings, each made by a process of its own, so that a crash costs one of them.
 
 use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command as Process, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{self, Sender};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use anyhow::{Context, bail};
 use clap::Args;
 use sha2::{Digest, Sha256};
 
 use super::door::Door;
-use super::export::read_twin;
 use super::output::write_file;
 use super::progress::Steps;
+use super::workers::{self, Plan, Task, read_made, twin_of};
 use super::{Answer, ConfigFile, Opening, print, shown};
 use crate::batch::estimate;
-use crate::batch::journal::{self, Entry, Journal, Key, Status};
-use crate::batch::manifest::{self, Row};
-use crate::batch::tables::{self, Made};
-use crate::evaluation::Predictions;
-use crate::json;
+use crate::batch::journal::{self, Journal, JournalEntry, JournalKey, Status};
+use crate::batch::manifest::{self, ManifestRow};
+use crate::batch::result_tables;
 use crate::report::table::aligned;
 
 #[derive(Debug, Args)]
 pub struct BatchArgs {
-    /// A table (.csv) with a column "recording", or JSON lines (.jsonl) with such a key: folders of recordings, from the
-    /// manifest's folder on; "name" and "config" may stand beside it
+    /// A table (.csv) with a column "recording", or JSON lines (.jsonl) with such a key, or with a list "recordings" of one
+    /// kitchen: folders of recordings, from the manifest's folder on; "name" and "config" may stand beside it
     manifest: PathBuf,
+    /// Folder from which the manifest's paths count [default: the manifest's]
+    #[arg(long, value_name = "DIR")]
+    root: Option<PathBuf>,
     /// Folder for the twins (twins/NAME), the journal and the tables results.csv, joints.csv, predictions.csv, timings.csv.
     /// What its journal says to be finished is not repeated
     #[arg(long, value_name = "DIR")]
@@ -39,6 +40,9 @@ pub struct BatchArgs {
     /// [default: one for every two cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
     jobs: Option<u32>,
+    /// End a recording's process after so many seconds; it counts as failed, and the next run tries it again
+    #[arg(long, value_name = "SECS", value_parser = clap::value_parser!(u64).range(1..))]
+    time_limit: Option<u64>,
     /// Repeat the recordings that failed
     #[arg(long)]
     retry: bool,
@@ -46,6 +50,13 @@ pub struct BatchArgs {
     /// them, the command without it writes the tables
     #[arg(long, value_name = "I/N", value_parser = shard)]
     shard: Option<(usize, usize)>,
+    /// A word of the command that starts `paws` for each recording, from the program's on: for programs that call this
+    /// command in their own process
+    #[arg(long, value_name = "WORD", hide = true, allow_hyphen_values = true)]
+    worker: Vec<OsString>,
+    /// Show plain boxes: no textures from the images. It saves most of the time and of the disk
+    #[arg(long)]
+    no_textures: bool,
     #[command(flatten)]
     opening: Opening,
     #[command(flatten)]
@@ -53,13 +64,6 @@ pub struct BatchArgs {
     #[command(flatten)]
     config: ConfigFile,
 }
-
-/// Between two looks at a process: at first, and at the most.
-const LOOK: [Duration; 2] = [Duration::from_millis(1), Duration::from_millis(20)];
-/// Of what a process says that much is kept in a table, characters.
-const MAX_REASON: usize = 2000;
-/// The program that makes a twin, where the one that runs is another's (Python's).
-const PROGRAM: &str = "PAWS_PROGRAM";
 
 /// Results of another version are made again.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -71,31 +75,16 @@ fn shard(text: &str) -> Result<(usize, usize), String> {
     }
 }
 
-/// A row that is to be run.
-struct Task<'a> {
-    row: &'a Row,
-    key: Key,
-    /// `--config`, where there is one.
-    config: Option<PathBuf>,
-}
-
-/// What all rows have in common.
-struct Plan<'a> {
-    args: &'a BatchArgs,
-    program: PathBuf,
-    /// Threads of each process.
-    threads: usize,
-}
-
 pub fn run(args: &BatchArgs) -> anyhow::Result<Answer> {
-    let rows = manifest::read(&args.manifest)?;
+    let rows = manifest::read(&args.manifest, args.root.as_deref())?;
+    let command = workers::command(&args.worker)?;
     prepare(&args.out)?;
     let (mut file, begun) = open_journal(&args.out, args.shard)?;
     for line in &begun.unread {
         eprintln!("{}: line {line} is no entry; its recording is made again", shown(&args.out.join(JOURNAL)));
     }
     let mut entries = all_entries(&args.out, &begun)?;
-    let mine: Vec<&Row> = match args.shard {
+    let mine: Vec<&ManifestRow> = match args.shard {
         None => rows.iter().collect(),
         Some((i, n)) => rows.iter().skip(i - 1).step_by(n).collect(),
     };
@@ -110,13 +99,13 @@ pub fn run(args: &BatchArgs) -> anyhow::Result<Answer> {
             entries.insert(entry.name.clone(), entry);
         }
     }
-    for entry in made(args, &tasks, &mut file)? {
+    for entry in made(args, command, &tasks, &mut file)? {
         entries.insert(entry.name.clone(), entry);
     }
     if args.shard.is_none() {
         write_tables(&args.out, &rows, &entries)?;
     }
-    let ended: Vec<&Entry> = mine.iter().filter_map(|row| entries.get(&row.name)).collect();
+    let ended: Vec<&JournalEntry> = mine.iter().filter_map(|row| entries.get(&row.name)).collect();
     let count = |status: Status| ended.iter().filter(|e| e.status == status).count();
     let counts = [Status::Done, Status::No, Status::Failed].map(|status| (status.word(), count(status)));
     let mut table = vec![vec!["status".to_owned(), "recordings".to_owned()]];
@@ -174,7 +163,7 @@ fn open_journal(out: &Path, shard: Option<(usize, usize)>) -> anyhow::Result<(Fi
 
 /// What this and all other runs in a folder have finished; of several entries of a name one of a twin, made by this version, is
 /// the better one.
-fn all_entries(out: &Path, own: &Journal) -> anyhow::Result<BTreeMap<String, Entry>> {
+fn all_entries(out: &Path, own: &Journal) -> anyhow::Result<BTreeMap<String, JournalEntry>> {
     let mut names: Vec<PathBuf> = std::fs::read_dir(out)
         .with_context(|| shown(out))?
         .flatten()
@@ -202,10 +191,10 @@ fn all_entries(out: &Path, own: &Journal) -> anyhow::Result<BTreeMap<String, Ent
 /// The rows that have to be run, those that cannot be, and how many are finished.
 fn sorted_out<'a>(
     args: &BatchArgs,
-    rows: &[Row],
-    mine: &[&'a Row],
-    entries: &BTreeMap<String, Entry>,
-) -> (Vec<Task<'a>>, Vec<Entry>, usize) {
+    rows: &[ManifestRow],
+    mine: &[&'a ManifestRow],
+    entries: &BTreeMap<String, JournalEntry>,
+) -> (Vec<Task<'a>>, Vec<JournalEntry>, usize) {
     let out = args.out.canonicalize().ok();
     // Whether recordings are nested or given twice is a matter of the whole manifest.
     let unfit: BTreeMap<usize, String> = rows
@@ -218,13 +207,13 @@ fn sorted_out<'a>(
     for &row in mine {
         let config = row.config.clone().or_else(|| args.config.config.clone());
         let hash = hashes.entry(config.clone()).or_insert_with(|| hashed(args, config.as_ref())).clone();
-        let key = Key {
-            recording: row.recording.canonicalize().unwrap_or_else(|_| row.recording.clone()).display().to_string(),
+        let key = JournalKey {
+            recordings: row.recordings.iter().map(|r| shown(&r.canonicalize().unwrap_or_else(|_| r.clone()))).collect(),
             config: hash.clone().unwrap_or_default(),
             version: VERSION.to_owned(),
         };
         if let Some(why) = unfit.get(&row.line).cloned().or(hash.err()) {
-            refused.push(Entry {
+            refused.push(JournalEntry {
                 name: row.name.clone(),
                 key,
                 status: Status::Failed,
@@ -242,7 +231,7 @@ fn sorted_out<'a>(
 }
 
 /// Whether an entry is the answer for a key, and its twin is there.
-fn is_finished(args: &BatchArgs, entry: &Entry, key: &Key) -> bool {
+fn is_finished(args: &BatchArgs, entry: &JournalEntry, key: &JournalKey) -> bool {
     if entry.key != *key {
         return false;
     }
@@ -251,10 +240,6 @@ fn is_finished(args: &BatchArgs, entry: &Entry, key: &Key) -> bool {
         Status::Failed => entry.code.is_some() && !args.retry,
         Status::Done | Status::No => twin_of(&args.out, &entry.name).join("twin.json").is_file(),
     }
-}
-
-fn twin_of(out: &Path, name: &str) -> PathBuf {
-    out.join("twins").join(name)
 }
 
 /// A hash of all that a twin depends on beside its recording, or why there is none.
@@ -275,11 +260,14 @@ fn flags(args: &BatchArgs) -> Vec<&'static str> {
     if args.opening.follow_links {
         flags.push("--follow-links");
     }
+    if args.no_textures {
+        flags.push("--no-textures");
+    }
     flags
 }
 
 /// Writes an entry and waits until the disk has it.
-fn append(file: &mut File, out: &Path, entry: &Entry) -> anyhow::Result<()> {
+fn append(file: &mut File, out: &Path, entry: &JournalEntry) -> anyhow::Result<()> {
     let line = journal::line(entry)?;
     file.write_all(line.as_bytes()).and_then(|()| file.sync_data()).with_context(|| {
         format!("{}: the journal cannot be written; what is in it is not repeated by the next run", shown(out))
@@ -295,19 +283,27 @@ impl Drop for StopAtEnd<'_> {
     }
 }
 
+/// Cores for all jobs together: what schedulers say in `RAYON_NUM_THREADS`, else those that this process may use.
+fn cores() -> usize {
+    let told = std::env::var("RAYON_NUM_THREADS").ok().and_then(|n| n.trim().parse::<usize>().ok()).filter(|n| *n > 0);
+    told.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get))
+}
+
 /// Runs all tasks; each is in the journal as soon as it is finished.
-fn made(args: &BatchArgs, tasks: &[Task], file: &mut File) -> anyhow::Result<Vec<Entry>> {
-    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
+fn made(
+    args: &BatchArgs,
+    command: Vec<OsString>,
+    tasks: &[Task],
+    file: &mut File,
+) -> anyhow::Result<Vec<JournalEntry>> {
+    let cores = cores();
     let jobs = args.jobs.map_or(cores.div_ceil(2), |n| n as usize).min(tasks.len().max(1));
-    let program = match std::env::var_os(PROGRAM).filter(|p| !p.is_empty()) {
-        Some(program) => PathBuf::from(program),
-        None => std::env::current_exe().context("where this program lies")?,
-    };
-    let plan = Plan { args, program, threads: (cores / jobs).max(1) };
+    let limit = args.time_limit.map(Duration::from_secs);
+    let plan = Plan { out: &args.out, command, flags: flags(args), threads: (cores / jobs).max(1), limit };
     let steps = Steps::new();
     let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
-    let (sender, receiver) = mpsc::channel::<anyhow::Result<Entry>>();
-    let mut finished: Vec<Entry> = Vec::new();
+    let (sender, receiver) = mpsc::channel::<anyhow::Result<JournalEntry>>();
+    let mut finished: Vec<JournalEntry> = Vec::new();
     let result = std::thread::scope(|scope| {
         let _stop = StopAtEnd(&stop);
         for _ in 0..jobs {
@@ -337,9 +333,15 @@ fn made(args: &BatchArgs, tasks: &[Task], file: &mut File) -> anyhow::Result<Vec
 }
 
 /// Takes tasks until there is none, or the run ends.
-fn work(plan: &Plan, tasks: &[Task], next: &AtomicUsize, stop: &AtomicBool, sender: &Sender<anyhow::Result<Entry>>) {
+fn work(
+    plan: &Plan,
+    tasks: &[Task],
+    next: &AtomicUsize,
+    stop: &AtomicBool,
+    sender: &Sender<anyhow::Result<JournalEntry>>,
+) {
     while let Some(task) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) {
-        let entry = match one(plan, task, stop) {
+        let entry = match workers::one(plan, task, stop) {
             Ok(Some(entry)) => Ok(entry),
             Ok(None) => return,
             Err(error) => Err(error),
@@ -350,95 +352,12 @@ fn work(plan: &Plan, tasks: &[Task], next: &AtomicUsize, stop: &AtomicBool, send
     }
 }
 
-/// Makes one twin; `None` where the run ended before. An error is one that all other rows would meet as well.
-fn one(plan: &Plan, task: &Task, stop: &AtomicBool) -> anyhow::Result<Option<Entry>> {
-    let (out, name) = (&plan.args.out, &task.row.name);
-    let begun = Instant::now();
-    let log = out.join("logs").join(format!("{name}.txt"));
-    let log_file = File::create(&log).with_context(|| shown(&log))?;
-    let mut process = Process::new(&plan.program);
-    process.args(["twin", "--with-parent"]).args(flags(plan.args)).arg("--out").arg(twin_of(out, name));
-    if let Some(config) = &task.config {
-        process.arg("--config").arg(config);
-    }
-    process.arg("--").arg(&task.row.recording);
-    process.env("RAYON_NUM_THREADS", plan.threads.to_string()).stdin(Stdio::piped()).stdout(Stdio::null());
-    let mut child = process.stderr(log_file).spawn().with_context(|| shown(&plan.program))?;
-    let Some(status) = waited(&mut child, stop)? else { return Ok(None) };
-    let said = std::fs::read(&log).map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).unwrap_or_default();
-    let (status, code, reason) = judged(status, &said, &twin_of(out, name));
-    if status == Status::Done {
-        // There is nothing in it that the twin does not say.
-        let _ = std::fs::remove_file(&log);
-    }
-    let secs = begun.elapsed().as_secs_f64();
-    Ok(Some(Entry { name: name.clone(), key: task.key.clone(), status, code, reason, secs }))
-}
-
-/// How a process ended; `None`, and it is no more, where the run ends before. (`Child::wait` would close its standard input,
-/// which is what tells it that its parent is gone.)
-fn waited(child: &mut Child, stop: &AtomicBool) -> anyhow::Result<Option<ExitStatus>> {
-    let [mut pause, longest] = LOOK;
-    loop {
-        if let Some(status) = child.try_wait().context("a twin's process")? {
-            return Ok(Some(status));
-        }
-        if stop.load(Ordering::Relaxed) {
-            let _ = child.kill();
-            let _ = child.wait();
-            return Ok(None);
-        }
-        std::thread::sleep(pause);
-        pause = (2 * pause).min(longest);
-    }
-}
-
-/// Status, code and reason of a process that has ended.
-fn judged(ended: ExitStatus, said: &str, twin: &Path) -> (Status, Option<i32>, String) {
-    let not_done: Vec<&str> = said.lines().filter_map(|line| line.strip_prefix("not done: ")).collect();
-    let status = match ended.code() {
-        Some(0) => Status::Done,
-        Some(1) => Status::No,
-        _ => Status::Failed,
-    };
-    if status == Status::Failed {
-        let error = format!("\n{said}").rsplit_once("\nerror: ").map(|(_, error)| error.trim().to_owned());
-        let why = match ended.code() {
-            Some(_) => error.unwrap_or_else(|| last_words(said)),
-            None => format!("{ended}; was the memory short? fewer --jobs take less"),
-        };
-        return (status, ended.code(), why.chars().take(MAX_REASON).collect());
-    }
-    match read_made(twin) {
-        Ok(made) => (status, ended.code(), tables::complaint(status, &not_done.join("; "), &made)),
-        Err(error) => (Status::Failed, ended.code(), format!("{error:#}")),
-    }
-}
-
-/// What a process said when it came to a bad end: where it panicked, else its last line.
-fn last_words(said: &str) -> String {
-    let lines: Vec<&str> = said.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
-    match lines.iter().position(|line| line.contains("panicked at")) {
-        // The place, and on the next line the reason.
-        Some(at) => lines.iter().skip(at).take(2).copied().collect::<Vec<&str>>().join(" "),
-        None => lines.last().copied().unwrap_or("it said nothing").to_owned(),
-    }
-}
-
-fn read_made(twin: &Path) -> anyhow::Result<Made> {
-    Ok(Made {
-        predictions: Predictions::read(&twin.join("predictions.json"))?,
-        twin: read_twin(twin)?,
-        validation: json::read(&twin.join("validation.json"))?,
-    })
-}
-
 /// Writes the tables of all rows, in the order of the manifest.
-fn write_tables(out: &Path, rows: &[Row], entries: &BTreeMap<String, Entry>) -> anyhow::Result<()> {
-    let mut results = tables::csv_line(&tables::RESULTS);
-    let mut joints = tables::csv_line(&tables::JOINTS);
-    let mut predictions = tables::csv_line(&tables::PREDICTIONS);
-    let mut timings = tables::csv_line(&tables::TIMINGS);
+fn write_tables(out: &Path, rows: &[ManifestRow], entries: &BTreeMap<String, JournalEntry>) -> anyhow::Result<()> {
+    let mut results = result_tables::csv_line(&result_tables::RESULTS);
+    let mut joints = result_tables::csv_line(&result_tables::JOINTS);
+    let mut predictions = result_tables::csv_line(&result_tables::PREDICTIONS);
+    let mut timings = result_tables::csv_line(&result_tables::TIMINGS);
     for row in rows {
         let Some(mut entry) = entries.get(&row.name).cloned() else { continue };
         let made = match entry.status {
@@ -454,11 +373,12 @@ fn write_tables(out: &Path, rows: &[Row], entries: &BTreeMap<String, Entry>) -> 
                 None
             }
         };
-        results += &tables::csv_line(&tables::result(&entry, &row.given, made.as_ref()));
-        timings += &tables::csv_line(&[row.name.clone(), format!("{:.3}", entry.secs)]);
+        results += &result_tables::csv_line(&result_tables::result(&entry, &row.given, made.as_ref()));
+        timings += &result_tables::csv_line(&[row.name.clone(), format!("{:.3}", entry.secs)]);
         if let Some(made) = &made {
-            joints.extend(tables::joints(&row.name, made).iter().map(|cells| tables::csv_line(cells)));
-            predictions.extend(tables::predictions(&row.name, made).iter().map(|cells| tables::csv_line(cells)));
+            joints.extend(result_tables::joints(&row.name, made).iter().map(|cells| result_tables::csv_line(cells)));
+            predictions
+                .extend(result_tables::predictions(&row.name, made).iter().map(|cells| result_tables::csv_line(cells)));
         }
     }
     let all = [("joints", joints), ("predictions", predictions), ("timings", timings), ("results", results)];
@@ -481,19 +401,18 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_is_told_by_its_place_and_reason() {
-        let said = "a note\n\nthread 'main' panicked at src/a.rs:1:2:\nindex out of bounds\nnote: run with more\n";
-        assert_eq!(last_words(said), "thread 'main' panicked at src/a.rs:1:2: index out of bounds");
-        assert_eq!((last_words("one\ntwo\n\n"), last_words("")), ("two".to_owned(), "it said nothing".to_owned()));
-    }
-
-    #[test]
     fn a_journal_that_is_in_use_or_cut_off_is_told_from_one_that_is_not() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join(JOURNAL);
-        let key = Key { recording: String::new(), config: String::new(), version: String::new() };
-        let entry =
-            Entry { name: "a".to_owned(), key, status: Status::Done, code: Some(0), reason: String::new(), secs: 1.0 };
+        let key = JournalKey { recordings: vec![], config: String::new(), version: String::new() };
+        let entry = JournalEntry {
+            name: "a".to_owned(),
+            key,
+            status: Status::Done,
+            code: Some(0),
+            reason: String::new(),
+            secs: 1.0,
+        };
         let whole = journal::line(&entry).unwrap();
         std::fs::write(&path, format!("{whole}{{\"name\": \"b\"")).unwrap();
         let (mut file, journal) = open_journal(dir.path(), None).unwrap();

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::{Answer, print, shown};
 use crate::json;
-use crate::model::check::{self, Point, Verdict};
+use crate::model::check::{self, CheckedPoint, PointVerdict};
 use crate::model::{self, glb};
 use crate::report::table::aligned;
 use crate::twin::Twin;
@@ -32,7 +32,7 @@ struct Checked {
     /// Why it could not be read; there are no points then.
     #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<String>,
-    points: Vec<Point>,
+    points: Vec<CheckedPoint>,
     /// What was not read.
     notes: Vec<String>,
 }
@@ -51,7 +51,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<Answer> {
     }
     print(&if args.json { json::text(&all)? } else { table(&all) })?;
     // What was not judged is no yes.
-    let is_no = |p: &Point| matches!(p.verdict, Verdict::Fail | Verdict::NotJudged);
+    let is_no = |p: &CheckedPoint| matches!(p.verdict, PointVerdict::Fail | PointVerdict::NotJudged);
     let no = all.iter().flat_map(|c| &c.points).any(is_no);
     Ok(if no || !errors.is_empty() { Answer::No } else { Answer::Yes })
 }
@@ -76,7 +76,7 @@ fn judged(input: &Path) -> Vec<Checked> {
 }
 
 /// What is told of a file, be it why it was not read.
-fn told(file: &Path, result: anyhow::Result<(Vec<Point>, Vec<String>)>) -> Checked {
+fn told(file: &Path, result: anyhow::Result<(Vec<CheckedPoint>, Vec<String>)>) -> Checked {
     let (error, (points, notes)) = match result {
         Ok(said) => (None, said),
         Err(e) => (Some(format!("{e:#}")), (Vec::new(), Vec::new())),
@@ -89,14 +89,7 @@ fn models_in(dir: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let mut found = BTreeSet::new();
     for entry in std::fs::read_dir(dir).with_context(|| shown(dir))? {
         let path = entry.with_context(|| shown(dir))?.path();
-        let is_model = path.is_file()
-            && match extension(&path).as_str() {
-                "urdf" | "glb" | "gltf" | "mjcf" => true,
-                // Much else is XML too.
-                "xml" => model::root_name(&path).is_ok_and(|name| name == "mujoco" || name == "robot"),
-                _ => false,
-            };
-        if is_model {
+        if path.is_file() && model::is_model(&path) {
             found.insert(path);
         }
     }
@@ -106,12 +99,8 @@ fn models_in(dir: &Path) -> anyhow::Result<Vec<PathBuf>> {
     Ok(found.into_iter().collect())
 }
 
-fn extension(path: &Path) -> String {
-    path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
-}
-
 /// Points and notes of one file.
-fn checked(path: &Path, twin: Option<&Twin>) -> anyhow::Result<(Vec<Point>, Vec<String>)> {
+fn checked(path: &Path, twin: Option<&Twin>) -> anyhow::Result<(Vec<CheckedPoint>, Vec<String>)> {
     if model::is_gltf(path) {
         let scene = glb::read(path)?;
         return Ok((check::scene(&scene, twin), scene.notes));
@@ -130,10 +119,10 @@ fn table(all: &[Checked]) -> String {
             let verdict = c.points.iter().find(|p| p.id == id).map(|p| p.verdict);
             match verdict {
                 None if c.error.is_some() => "not read",
-                Some(Verdict::Pass) => "ok",
-                Some(Verdict::Fail) => "FAIL",
-                Some(Verdict::NotJudged) => "?",
-                Some(Verdict::NotApplicable) | None => "-",
+                Some(PointVerdict::Pass) => "ok",
+                Some(PointVerdict::Fail) => "FAIL",
+                Some(PointVerdict::NotJudged) => "?",
+                Some(PointVerdict::NotApplicable) | None => "-",
             }
             .to_owned()
         }));

@@ -5,17 +5,22 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::door::Door;
+use super::many::Given;
 use super::{Answer, Opening, twin};
 use crate::config::Config;
+use crate::synth::{Changes, SynthOptions};
 
 #[derive(Debug, Args)]
 pub struct DemoArgs {
     /// Folder for the recording (kitchen/) and its twin (twin/)
     #[arg(long, value_name = "DIR", default_value = "demo")]
     out: PathBuf,
-    /// Leave the furniture and the room the plain boxes that they collide as
+    /// Show plain boxes: no textures from the images
     #[arg(long)]
     no_textures: bool,
+    /// Render flat colours in the place of wood, tiles, stone and brushed steel
+    #[arg(long)]
+    plain: bool,
 }
 
 /// The demo's kitchen: the seed says which.
@@ -24,9 +29,12 @@ const SEED: u64 = 7;
 pub fn run(args: &DemoArgs) -> anyhow::Result<Answer> {
     let (recording, twin) = (args.out.join("kitchen"), args.out.join("twin"));
     eprintln!("rendering a recording of a kitchen into {} ...", recording.display());
-    super::synth::write(&crate::synth::Options { seed: SEED, width: 480, parts: 6, ..Default::default() }, &recording)?;
+    let options = SynthOptions { seed: SEED, width: 480, parts: 6, ..Default::default() };
+    super::synth::write(&options, &Changes { materials: !args.plain, ..Default::default() }, &recording)?;
     eprintln!("making its twin ...");
-    let given = twin::Given { recording: &recording, opening: Opening::default(), door: Door::default() };
+    let recordings = [recording];
+    let (opening, door) = (Opening::default(), Door::default());
+    let given = Given { recordings: &recordings, opening, door, one_frame: false, cache: None };
     let wishes = twin::Wishes { steps: true, textures: !args.no_textures };
     twin::make(given, &twin, &Config::default(), wishes, None)
 }

@@ -15,10 +15,11 @@ const ROUNDS: usize = 3;
 /// What is done about a recording whose poses, hands or clocks contradict each other.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub struct Door {
-    /// Correct what is certain about camera axes, directions, units, up and lags, in memory (the recording stays as it is)
+    /// Correct faults found for certain in the recording's conventions (camera axes, directions, units, up, lags); the files
+    /// stay as they are
     #[arg(long, conflicts_with = "as_is")]
     fix: bool,
-    /// Go on although poses, hands or depth certainly contradict each other
+    /// Ignore faults found for certain in the recording's conventions, and go on with it as it is
     #[arg(long)]
     as_is: bool,
 }
@@ -88,7 +89,15 @@ fn told(finding: &Finding) -> String {
 pub fn check(recordings: &[std::path::PathBuf]) -> anyhow::Result<Answer> {
     let mut answer = Answer::Yes;
     for dir in recordings {
-        let recording = Recording::open_unjudged(dir, true)?;
+        let recording = match Recording::open_unjudged(dir, true) {
+            Ok(recording) => recording,
+            Err(error) if recordings.len() == 1 => return Err(error.into()),
+            Err(error) => {
+                eprintln!("{error}");
+                answer = Answer::No;
+                continue;
+            }
+        };
         let found = findings(&Subject::of(&recording));
         if found.is_empty() {
             print(&format!("{}: poses, depth, hands and up agree, as far as the recording has them\n", shown(dir)))?;

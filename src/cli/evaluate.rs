@@ -11,16 +11,18 @@ use super::evaluate_joints::{self, Compared};
 use super::joints::JointArgs;
 use super::output::write_file;
 use super::{Answer, print, shown};
-use crate::evaluation::parts::PartReport;
-use crate::evaluation::{Paired, Predictions, Report, Truth, compare, evaluate};
+use crate::error::Result;
+use crate::evaluation::point_parts::PartReport;
+use crate::evaluation::truth::read_each;
+use crate::evaluation::{EvaluationReport, Paired, Predictions, Truth, compare, evaluate, frame_contradictions};
 use crate::json;
 use crate::report::accuracy;
 
 #[derive(Debug, Args)]
 pub struct EvaluateArgs {
     /// predictions.json, or a folder that `paws twin` wrote; then the recordings with a ground_truth.json, or such files.
-    /// With --truth all of them are predictions, taken together. Joints of data sets (docs/joints-format.md) are compared as
-    /// well: PREDICTED TRUE
+    /// A scene of several recordings is held against the truth of each. With --truth all are predictions, taken together.
+    /// Joints of data sets (docs/joints-format.md) are compared as well: PREDICTED TRUE
     #[arg(required = true, value_name = "PREDICTIONS RECORDING")]
     inputs: Vec<PathBuf>,
     /// Recordings with a ground_truth.json, or such files; or the true joints of as many predictions
@@ -49,7 +51,7 @@ pub struct EvaluateArgs {
 #[derive(Serialize)]
 struct File<'a> {
     #[serde(flatten)]
-    report: &'a Report,
+    report: &'a EvaluationReport,
     /// The difference to other predictions.
     #[serde(skip_serializing_if = "Option::is_none")]
     against: Option<Vec<Paired>>,
@@ -108,7 +110,7 @@ fn of_joints(args: &EvaluateArgs, files: &[PathBuf], truths: &[PathBuf]) -> anyh
     if args.details {
         print(&accuracy::details(&report))?;
     }
-    print(&crate::report::parts::table(&parts))?;
+    print(&crate::report::part_table::table(&parts))?;
     if let Some(path) = &args.csv {
         write_file(path, accuracy::csv(&report))?;
     }
@@ -120,12 +122,30 @@ fn of_joints(args: &EvaluateArgs, files: &[PathBuf], truths: &[PathBuf]) -> anyh
 
 /// The truths of recordings, each of another name.
 pub fn truths(recordings: &[PathBuf]) -> anyhow::Result<Vec<Truth>> {
-    let truths: Vec<Truth> = recordings.iter().map(|p| Truth::read(p)).collect::<Result<_, _>>()?;
+    let truths: Vec<Truth> = recordings.iter().map(|p| Truth::read(p)).collect::<Result<_>>()?;
+    check_names(&truths)?;
+    Ok(truths)
+}
+
+/// What can be read of recordings, in their order; why others are left out goes to standard error.
+pub fn opened<T>(recordings: &[PathBuf], open: impl Fn(&Path) -> Result<T>) -> anyhow::Result<Vec<T>> {
+    let (opened, left_out) = read_each(recordings, open)?;
+    for error in left_out {
+        eprintln!("left out: {error}");
+    }
+    if opened.is_empty() {
+        bail!("none of the {} recordings can be read", recordings.len());
+    }
+    Ok(opened)
+}
+
+/// Refuses truths of recordings with one name: predictions name their recording.
+pub fn check_names(truths: &[Truth]) -> anyhow::Result<()> {
     let names: BTreeSet<&str> = truths.iter().map(|t| t.recording.as_str()).collect();
     if names.len() != truths.len() {
         bail!("two of the truths are of recordings with one name; rename a folder");
     }
-    Ok(truths)
+    Ok(())
 }
 
 /// Predictions of several files together; a clip may have a row in one of them only.
@@ -135,7 +155,11 @@ fn predictions(files: &[PathBuf], truths: &[Truth]) -> anyhow::Result<Prediction
     for path in files {
         let file = if path.is_dir() { path.join("predictions.json") } else { path.clone() };
         let read = Predictions::read(&file)?;
-        check_units(&read, truths, &file)?;
+        for truth in truths {
+            if let Some(why) = frame_contradictions::contradiction(&read.predictions, truth) {
+                bail!("{}: recording {}: {why}", file.display(), truth.recording);
+            }
+        }
         for row in read.predictions {
             if !seen.insert((row.recording.clone(), row.clip.clone())) {
                 bail!("{}: {}/{} is in an earlier file already", file.display(), row.recording, row.clip);
@@ -144,25 +168,4 @@ fn predictions(files: &[PathBuf], truths: &[Truth]) -> anyhow::Result<Prediction
         }
     }
     Ok(all)
-}
-
-/// A prediction a hundred metres from its truth is in another unit or another world frame, not merely wrong.
-fn check_units(predictions: &Predictions, truths: &[Truth], file: &Path) -> anyhow::Result<()> {
-    for truth in truths {
-        let distances: Vec<f64> = predictions
-            .predictions
-            .iter()
-            .filter(|p| p.recording == truth.recording)
-            .filter_map(|p| Some((p.origin? - truth.clips.get(&p.clip)?.as_ref()?.origin).norm()))
-            .collect();
-        if let Some(median) = crate::math::stats::median(&distances).filter(|d| *d > 100.0) {
-            bail!(
-                "{}: recording {}: origins lie {median:.0} from the truth (median): predictions and truth disagree on the \
-                 unit (metres) or the world frame",
-                file.display(),
-                truth.recording
-            );
-        }
-    }
-    Ok(())
 }

@@ -8,10 +8,10 @@ use serde_json::Value;
 
 use super::joints::{self, JointArgs};
 use super::shown;
-use crate::evaluation::parts::{PartReport, compare_parts};
-use crate::evaluation::{Predictions, Report, Truth, evaluate, scenes};
+use crate::evaluation::point_parts::{PartReport, compare_parts};
+use crate::evaluation::{EvaluationReport, Predictions, Truth, evaluate, scenes};
 use crate::import::articulations::shape::PartBox;
-use crate::import::articulations::{self, Joint, Scene};
+use crate::import::articulations::{self, FoundJoint, JointScene};
 use crate::json;
 use crate::math::Vector;
 
@@ -26,7 +26,7 @@ pub fn is_scene(path: &Path) -> bool {
 /// What came of comparing joints.
 pub struct Compared {
     /// By the rules, one "clip" a joint.
-    pub report: Report,
+    pub report: EvaluationReport,
     /// By the points of parts, where both sides have them.
     pub parts: Vec<PartReport>,
 }
@@ -43,7 +43,7 @@ pub fn run(predictions: &[PathBuf], truths: &[PathBuf], args: &JointArgs) -> any
     }
     let mut rows = Predictions::default();
     let mut all: Vec<Truth> = Vec::new();
-    let mut pairs: Vec<(Scene, Scene)> = Vec::new();
+    let mut pairs: Vec<(JointScene, JointScene)> = Vec::new();
     let mut names = BTreeSet::new();
     for (prediction, truth_file) in predictions.iter().zip(truths) {
         let mut truth = args.read(truth_file)?;
@@ -65,15 +65,15 @@ pub fn run(predictions: &[PathBuf], truths: &[PathBuf], args: &JointArgs) -> any
         pairs.push((predicted, truth));
     }
     let report = evaluate(&rows, &all);
-    let both: Vec<(&Scene, &Scene)> = pairs.iter().map(|(p, t)| (p, t)).collect();
+    let both: Vec<(&JointScene, &JointScene)> = pairs.iter().map(|(p, t)| (p, t)).collect();
     let counted = pairs.iter().any(|(p, _)| p.joints.iter().any(|j| j.points.is_some()));
     let parts = OVERLAPS.into_iter().filter(|_| counted).filter_map(|iou| compare_parts(&both, iou)).collect();
     Ok(Compared { report, parts })
 }
 
 /// Tells how joints were paired, and which rules the truth cannot serve.
-fn tell(prediction: &Path, truth_file: &Path, predicted: &Scene, truth: &Scene, extra: &[usize]) {
-    let lists = |scene: &Scene| scene.joints.iter().all(|j| j.points.is_some());
+fn tell(prediction: &Path, truth_file: &Path, predicted: &JointScene, truth: &JointScene, extra: &[usize]) {
+    let lists = |scene: &JointScene| scene.joints.iter().all(|j| j.points.is_some());
     let by = if lists(predicted) && lists(truth) {
         "by the points that parts share"
     } else {
@@ -89,7 +89,7 @@ fn tell(prediction: &Path, truth_file: &Path, predicted: &Scene, truth: &Scene, 
         if ids.is_empty() { "" } else { "; with none: " },
         ids.join(", ")
     );
-    let without = |has: fn(&Joint) -> bool| truth.joints.iter().filter(|j| !has(j)).count();
+    let without = |has: fn(&FoundJoint) -> bool| truth.joints.iter().filter(|j| !has(j)).count();
     for (count, what, rules) in [
         (without(|j| j.part.is_some()), "box of the part", "OPDMulti and S2O"),
         (without(|j| j.range.is_some()), "range", "SIM"),
@@ -104,7 +104,7 @@ fn tell(prediction: &Path, truth_file: &Path, predicted: &Scene, truth: &Scene, 
 }
 
 /// The predicted joints of a file: of any format of joints, or of our `predictions.json`.
-fn predicted(path: &Path, truth: &Scene, args: &JointArgs) -> anyhow::Result<Scene> {
+fn predicted(path: &Path, truth: &JointScene, args: &JointArgs) -> anyhow::Result<JointScene> {
     let file = match path.join("twin.json") {
         twin if path.is_dir() && twin.exists() => twin,
         _ => path.to_owned(),
@@ -115,7 +115,7 @@ fn predicted(path: &Path, truth: &Scene, args: &JointArgs) -> anyhow::Result<Sce
 }
 
 /// Rows about clips as joints: of each joint the first row.
-fn from_rows(file: &Path, truth: &Scene) -> anyhow::Result<Scene> {
+fn from_rows(file: &Path, truth: &JointScene) -> anyhow::Result<JointScene> {
     let rows = Predictions::read(file)?.predictions;
     let recordings: BTreeSet<&str> = rows.iter().map(|r| r.recording.as_str()).collect();
     if recordings.len() > 1 && !recordings.contains(truth.name.as_str()) {
@@ -129,7 +129,7 @@ fn from_rows(file: &Path, truth: &Scene) -> anyhow::Result<Scene> {
         let place = row.origin.or(part.map(|b| b.center));
         let (Some(kind), Some(axis), Some(origin)) = (row.kind, row.axis, place) else { continue };
         if seen.insert(id.clone()) {
-            joints.push(Joint {
+            joints.push(FoundJoint {
                 label: id.clone(),
                 id,
                 kind,
@@ -144,7 +144,7 @@ fn from_rows(file: &Path, truth: &Scene) -> anyhow::Result<Scene> {
             });
         }
     }
-    Ok(Scene {
+    Ok(JointScene {
         name: truth.name.clone(),
         format: "paws",
         up: Vector::z(),

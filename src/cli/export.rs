@@ -1,46 +1,43 @@
 //! `paws export`.
 
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use anyhow::{Context, bail};
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use rayon::prelude::*;
 
 use super::joints::{JointArgs, is_joints};
 use super::output::{restore, write_file};
 use super::primitives::{hands_beside, rows_beside, seen};
-use super::twin::JointHands;
 use super::{Answer, look, print, shown};
 use crate::evaluation::Predictions;
-use crate::export::annotations::{self, Shown};
+use crate::export::annotations::Shown;
+use crate::export::{ExportContext, ExportFormat, ExportedFiles, FORMATS, Need, Purpose};
 use crate::import::ply::Cloud;
 use crate::import::{articulations, ply};
-use crate::look::Look;
+use crate::make::JointHands;
 use crate::validation::Validation;
 use crate::{export, json, primitives, twin::Twin};
 
-/// A file format.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Format {
-    /// Robot description for ROS, PyBullet, Drake, Pinocchio
-    Urdf,
-    /// MuJoCo model
-    Mjcf,
-    /// Binary glTF 2.0 with animations, for viewers
-    Gltf,
-    /// Binary glTF 2.0 with KHR_physics_rigid_bodies, for engines
-    GltfPhysics,
-    /// OpenUSD with UsdPhysics, for Isaac: as text, and with its pictures as one file
-    Usd,
-    /// What a robot needs to open each joint: grasp, path, Dynamic Movement Primitive (primitives.json; docs/primitives.md)
-    Primitives,
-    /// Arti4D's list of joints (arti4d.json)
-    Arti4d,
-    /// EgoArti's list of clips and their annotations (egoarti_list.json, egoarti.json)
-    Egoarti,
-    /// What USDNet is trained on: parts as points of --points, with their joints (usdnet_articulation.json, usdnet.npy,
-    /// usdnet_instance_gt.txt)
-    Usdnet,
+/// Takes the name of a format; the help lists all of them.
+fn format_parser() -> impl TypedValueParser<Value = &'static ExportFormat> {
+    let names = FORMATS.iter().map(|format| PossibleValue::new(format.name).help(format.help));
+    PossibleValuesParser::new(names).try_map(|name| export::named(&name).ok_or("no such format"))
+}
+
+/// The formats that are written where none are named.
+static DEFAULT_FORMATS: LazyLock<String> = LazyLock::new(|| {
+    let names: Vec<&str> = FORMATS.iter().filter(|f| f.purpose != Purpose::DataSet).map(|f| f.name).collect();
+    names.join(",")
+});
+
+/// What goes to `--out`.
+fn out_help() -> String {
+    let [models, robot] =
+        [Purpose::Model, Purpose::Robot].map(|purpose| export::names_of(purpose).collect::<Vec<_>>().join(", "));
+    format!("Folder for {models}, look/, {robot}; and for twin.json where joints were given")
 }
 
 #[derive(Debug, Args)]
@@ -49,16 +46,14 @@ pub struct ExportArgs {
     /// other programs (docs/joints-format.md)
     twin: PathBuf,
     /// Formats, separated by commas
-    #[arg(long, value_delimiter = ',', default_value = "urdf,mjcf,gltf,gltf-physics,usd,primitives")]
-    format: Vec<Format>,
+    #[arg(long, value_delimiter = ',', value_parser = format_parser(), default_value = DEFAULT_FORMATS.as_str())]
+    format: Vec<&'static ExportFormat>,
     #[command(flatten)]
     joints: JointArgs,
     /// Leave out what the twin looks like, which is read from the folder that `paws twin` wrote
     #[arg(long)]
     no_textures: bool,
-    /// Folder for scene.urdf, scene.xml, kitchen.xml, scene.glb, physics.glb, scene.usda, scene.usdz, look/, primitives.json;
-    /// and for twin.json where joints were given
-    #[arg(long, value_name = "DIR", default_value = ".")]
+    #[arg(long, value_name = "DIR", default_value = ".", help = out_help())]
     out: PathBuf,
 }
 
@@ -105,19 +100,10 @@ fn kind_of(path: &Path) -> anyhow::Result<Given> {
 }
 
 /// A file's name and contents.
-type File = (String, Vec<u8>);
+type NamedFile = (String, Vec<u8>);
 
-impl Format {
-    /// Whether its files show the meshes and pictures beside them.
-    fn needs_look(self) -> bool {
-        matches!(self, Self::Urdf | Self::Mjcf | Self::Usd)
-    }
-}
-
-/// What formats need beside the twin.
-struct Beside {
-    /// Verdicts of joints.
-    verdicts: Vec<(String, String)>,
+/// What the chosen formats need beside the twin, as far as it lies in files.
+struct Gathered {
     /// Clips with their joints.
     clips: Vec<Shown>,
     /// Recorded hands of each joint.
@@ -126,30 +112,30 @@ struct Beside {
     rows: Predictions,
     /// The reconstruction.
     cloud: Option<Cloud>,
-    /// What the twin looks like.
-    look: Option<Look>,
 }
 
-impl Beside {
+impl Gathered {
     /// What the asked formats need; `beside_twin` is the folder that a twin lies in.
-    fn of(
-        args: &ExportArgs,
-        verdicts: Vec<(String, String)>,
-        look: Option<Look>,
-        beside_twin: Option<&Path>,
-    ) -> anyhow::Result<Self> {
-        let clips = if args.format.contains(&Format::Egoarti) { clips(&args.twin)? } else { Vec::new() };
-        let cloud = match (&args.joints.points, args.format.contains(&Format::Usdnet)) {
+    fn of(args: &ExportArgs, beside_twin: Option<&Path>) -> anyhow::Result<Self> {
+        let clips = if args.needs(Need::Clips) { clips(&args.twin)? } else { Vec::new() };
+        let cloud = match (&args.joints.points, args.needs(Need::Points)) {
             (_, false) => None,
             (Some(points), true) => Some(ply::read(points)?),
             (None, true) => bail!("usdnet: parts are points of a reconstruction: give it by --points FILE.ply"),
         };
         // Joints found elsewhere have no recording, whatever else lies in their folder.
-        let (hands, rows) = match (beside_twin, args.format.contains(&Format::Primitives)) {
+        let (hands, rows) = match (beside_twin, args.needs(Need::Primitives)) {
             (Some(dir), true) => (hands_beside(dir)?, rows_beside(dir)?),
             _ => (Vec::new(), Predictions { predictions: Vec::new() }),
         };
-        Ok(Self { verdicts, clips, hands, rows, cloud, look })
+        Ok(Self { clips, hands, rows, cloud })
+    }
+}
+
+impl ExportArgs {
+    /// Whether a chosen format needs something.
+    fn needs(&self, need: Need) -> bool {
+        self.format.iter().any(|format| format.need == need)
     }
 }
 
@@ -169,49 +155,27 @@ fn clips(twin: &Path) -> anyhow::Result<Vec<Shown>> {
         .collect())
 }
 
-/// The files of one format.
-fn written(format: Format, twin: &Twin, beside: &Beside) -> crate::error::Result<Vec<File>> {
-    let look = beside.look.as_ref();
-    let files: Vec<(&str, Vec<u8>)> = match format {
-        Format::Urdf => vec![("scene.urdf", export::urdf::write(twin, look)?.into_bytes())],
-        Format::Mjcf => vec![
-            ("scene.xml", export::mjcf::write(twin, look)?.into_bytes()),
-            ("kitchen.xml", export::mjcf::write_model(twin, look)?.into_bytes()),
-        ],
-        Format::Gltf => vec![("scene.glb", export::gltf::write(twin, look, &beside.verdicts)?)],
-        Format::GltfPhysics => vec![("physics.glb", export::gltf::write_physics(twin)?)],
-        Format::Usd => vec![
-            ("scene.usda", export::usd::write(twin, look)?.into_bytes()),
-            ("scene.usdz", export::usd::write_package(twin, look)?),
-        ],
-        Format::Primitives => {
-            let seen = seen(&beside.hands, &beside.verdicts, &beside.rows);
-            vec![("primitives.json", json::text(&primitives::of(twin, &seen))?.into_bytes())]
+/// The files of all chosen formats; what could not be written of a twin goes to standard error.
+fn written(args: &ExportArgs, twin: &Twin, beside: &ExportContext) -> crate::error::Result<Vec<NamedFile>> {
+    let made: Vec<crate::error::Result<ExportedFiles>> =
+        args.format.par_iter().map(|format| (format.write)(twin, beside)).collect();
+    let mut files = Vec::new();
+    for (format, made) in args.format.iter().zip(made) {
+        let made = made?;
+        for why in &made.left_out {
+            eprintln!("{}: {why}", format.name);
         }
-        Format::Arti4d => vec![("arti4d.json", annotations::arti4d(twin)?.into_bytes())],
-        Format::Egoarti => {
-            let [list, all] = annotations::egoarti(twin, &beside.clips)?;
-            vec![("egoarti_list.json", list.into_bytes()), ("egoarti.json", all.into_bytes())]
-        }
-        Format::Usdnet => {
-            let Some(cloud) = &beside.cloud else { return Ok(Vec::new()) };
-            let parts = annotations::usdnet(twin, cloud)?;
-            for id in &parts.unseen {
-                eprintln!("usdnet: {id}: no point of the reconstruction lies on it; it is left out");
-            }
-            vec![
-                ("usdnet_articulation.json", parts.articulation.into_bytes()),
-                ("usdnet.npy", parts.points),
-                ("usdnet_instance_gt.txt", parts.instances.into_bytes()),
-            ]
-        }
-    };
-    Ok(files.into_iter().map(|(name, bytes)| (name.to_owned(), bytes)).collect())
+        files.extend(format.files.iter().zip(made.files).map(|(file, bytes)| (file.name.to_owned(), bytes)));
+    }
+    if let Some(look) = beside.look.filter(|_| args.needs(Need::LookFiles)) {
+        files.extend(export::dress::files(twin, look)?);
+    }
+    Ok(files)
 }
 
 pub fn run(args: &ExportArgs) -> anyhow::Result<Answer> {
     // Every format is made before the first is written: nothing half-done is left behind.
-    let mut files: Vec<File> = Vec::new();
+    let mut files: Vec<NamedFile> = Vec::new();
     let given = if args.joints.is_forced() { Given::Joints } else { kind_of(&args.twin)? };
     // What could not be built of a twin was said when it was made.
     let made_here = matches!(given, Given::Joints);
@@ -241,15 +205,23 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<Answer> {
         true => Some(args.twin.as_path()),
         false => args.twin.parent(),
     };
-    let beside = Beside::of(args, verdicts, look, folder.filter(|_| !made_here))?;
-    let made: Vec<crate::error::Result<Vec<File>>> =
-        args.format.par_iter().map(|format| written(*format, &twin, &beside)).collect();
-    for format in made {
-        files.extend(format?);
-    }
-    if let Some(look) = beside.look.as_ref().filter(|_| args.format.iter().any(|f| f.needs_look())) {
-        files.extend(export::dress::files(&twin, look)?);
-    }
+    let gathered = Gathered::of(args, folder.filter(|_| !made_here))?;
+    let primitives = match args.needs(Need::Primitives) {
+        true => json::text(&primitives::of(
+            &twin,
+            &seen(&gathered.hands, &verdicts, &gathered.rows),
+            &crate::config::Primitives::default(),
+        ))?,
+        false => String::new(),
+    };
+    let beside = ExportContext {
+        look: look.as_ref(),
+        verdicts: &verdicts,
+        clips: &gathered.clips,
+        cloud: gathered.cloud.as_ref(),
+        primitives: &primitives,
+    };
+    files.extend(written(args, &twin, &beside)?);
     for (name, bytes) in files {
         let path = args.out.join(name);
         let folder = path.parent().unwrap_or(&args.out);

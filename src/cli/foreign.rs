@@ -9,13 +9,13 @@ use nalgebra::UnitQuaternion;
 use super::joints::JointArgs;
 use super::moved::{self, Motion};
 use super::shown;
-use super::twin::JointHands;
 use super::units::UnitsArgs;
 use crate::articulation::Action;
 use crate::fitting::joints::upright;
 use crate::hands::{Sample, Trajectory};
 use crate::inference::bare;
-use crate::math::Point;
+use crate::make::JointHands;
+use crate::math::{Point, stats};
 use crate::model::{self, furniture};
 use crate::recording::trajectory::{self, BareTrajectory};
 use crate::twin::{ContactRules, Part, Twin};
@@ -100,7 +100,8 @@ pub fn load(path: &Path, args: &ForeignArgs) -> anyhow::Result<Loaded> {
     tell_left_out(path, &twin);
     let names: Vec<&str> = twin.furniture.iter().map(|f| f.part.label.as_str()).collect();
     if names.is_empty() {
-        bail!("{}: no joint of it can be simulated (`paws check` says more)", shown(path));
+        let why: Vec<String> = twin.left_out.iter().take(3).map(|l| format!("; {}: {}", l.id, l.reason)).collect();
+        bail!("{}: no joint of it can be simulated (`paws check` says more){}", shown(path), why.concat());
     }
     let frame = Frame { path, model: Some(&model), turn: UnitQuaternion::identity(), names };
     let hands = hands(&frame, &twin, args)?;
@@ -157,11 +158,16 @@ fn hands(frame: &Frame<'_>, twin: &Twin, args: &ForeignArgs) -> anyhow::Result<V
         for p in &mut recorded.positions {
             *p = frame.turn * *p;
         }
-        let points = bare::robust(&recorded.positions);
+        let points = bare::robust(&recorded.positions, &crate::config::Bare::default());
         let index = match wanted {
             Some(name) => match twin.furniture.iter().position(|f| f.part.label == name || f.part.id == name) {
                 Some(index) => index,
-                None => bail!("{}: no joint {name} that can be simulated; there are {}", shown(path), names.join(", ")),
+                None => {
+                    let left = twin.left_out.iter().find(|left| left.id == name);
+                    let why = left.map_or_else(String::new, |left| format!(" ({})", left.reason));
+                    let there = names.join(", ");
+                    bail!("{}: no joint {name} that can be simulated{why}; there are {there}", shown(path))
+                }
             },
             None if names.len() == 1 => 0,
             None => {
@@ -181,7 +187,8 @@ fn hands(frame: &Frame<'_>, twin: &Twin, args: &ForeignArgs) -> anyhow::Result<V
             Some(action) => Motion { action, samples: points.len() },
             None => told(file, part, &points),
         };
-        let made = as_hand(&recorded, &points, motion);
+        let step = if recorded.times_secs.is_empty() { step_secs(file, &points) } else { 0.0 };
+        let made = as_hand(&recorded, &points, motion, step);
         if let Err(fault) = made.check() {
             bail!("{}: {fault}", shown(file));
         }
@@ -191,8 +198,12 @@ fn hands(frame: &Frame<'_>, twin: &Twin, args: &ForeignArgs) -> anyhow::Result<V
     Ok(hands)
 }
 
-/// Samples a second of a path without time stamps: a video's.
+/// Samples a second of a path without time stamps, at the most: a video's.
 const RATE_HZ: f64 = 30.0;
+/// How fast a hand is taken to go where samples without time stamps are far apart, m/s: an easy pull.
+const EASY_M_PER_S: f64 = 0.5;
+/// Share of the steps by which that is told: single jumps are none of the hand's.
+const STEPS_SHARE: f64 = 0.95;
 
 /// A recorded path; what was left out of it, and what its time stamps are, is told.
 fn read(file: &Path, args: &ForeignArgs) -> anyhow::Result<BareTrajectory> {
@@ -201,10 +212,25 @@ fn read(file: &Path, args: &ForeignArgs) -> anyhow::Result<BareTrajectory> {
         eprintln!("{}: {note}", shown(file));
     }
     moved::check_times(file, &recorded)?;
-    if recorded.times_secs.is_empty() {
+    Ok(recorded)
+}
+
+/// Seconds from one sample to the next of a path without time stamps, which is told: a video's, or what an easy pull takes from
+/// one to the next where they are further apart.
+fn step_secs(file: &Path, points: &[Point]) -> f64 {
+    let steps: Vec<f64> = points.windows(2).map(|w| (w[1] - w[0]).norm()).collect();
+    let step = stats::quantile(&steps, STEPS_SHARE).unwrap_or(0.0);
+    let taken = (step / EASY_M_PER_S).max(1.0 / RATE_HZ);
+    if taken > 1.0 / RATE_HZ {
+        eprintln!(
+            "{}: has no time stamps, and its samples are up to {:.0} cm apart; {taken:.2} s are taken from one to the next",
+            shown(file),
+            100.0 * step
+        );
+    } else {
         eprintln!("{}: has no time stamps; {RATE_HZ} samples a second are taken", shown(file));
     }
-    Ok(recorded)
+    taken
 }
 
 /// What a path does to its part, by its motion along the joint, which is told.
@@ -225,8 +251,8 @@ fn told(file: &Path, part: &Part, points: &[Point]) -> Motion {
     motion
 }
 
-/// The path as a hand's.
-fn as_hand(recorded: &BareTrajectory, points: &[Point], motion: Motion) -> Trajectory {
+/// The path as a hand's; its samples are `step_secs` apart where it has no time stamps.
+fn as_hand(recorded: &BareTrajectory, points: &[Point], motion: Motion, step_secs: f64) -> Trajectory {
     let samples = points
         .iter()
         .zip(&recorded.positions)
@@ -234,7 +260,7 @@ fn as_hand(recorded: &BareTrajectory, points: &[Point], motion: Motion) -> Traje
         .enumerate()
         .map(|(k, (smoothed, observed))| Sample {
             frame: k,
-            time_secs: recorded.times_secs.get(k).copied().unwrap_or(k as f64 / RATE_HZ),
+            time_secs: recorded.times_secs.get(k).copied().unwrap_or(k as f64 * step_secs),
             observed: *observed,
             smoothed: *smoothed,
             accepted: true,

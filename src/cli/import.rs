@@ -11,9 +11,9 @@ use super::output::{Kind, Output};
 use super::progress::Steps;
 use super::{Answer, print, shown};
 use crate::import::capture::{CameraAxes, Direction, QuaternionOrder};
-use crate::import::formats::{self, Format};
+use crate::import::formats::{self, ImportFormat};
 use crate::import::optics::Optics;
-use crate::import::{Capture, Imported, Options, Written, assemble, axes};
+use crate::import::{Capture, ImportOptions, Imported, Written, assemble, axes};
 use crate::math::Vector;
 use crate::report::table::aligned;
 
@@ -144,7 +144,7 @@ fn topic(text: &str) -> Result<(String, String), String> {
 }
 
 /// The options that the arguments say. `width`: the images', pixels, where they do not say it.
-pub fn options(f: &FrameArgs, c: &ConventionArgs, width: u32) -> anyhow::Result<Options> {
+pub fn options(f: &FrameArgs, c: &ConventionArgs, width: u32) -> anyhow::Result<ImportOptions> {
     for (name, value) in [
         ("--source-fps", f.source_fps),
         ("--fov", f.fov),
@@ -160,7 +160,7 @@ pub fn options(f: &FrameArgs, c: &ConventionArgs, width: u32) -> anyhow::Result<
     if !f.fps.is_finite() || f.fps < 0.0 || !c.hand_lag.is_finite() {
         bail!("--fps {} and --hand-lag {}: give finite numbers, --fps from 0 on", f.fps, c.hand_lag);
     }
-    Ok(Options {
+    Ok(ImportOptions {
         fps: f.fps,
         source_fps: f.source_fps,
         max_gap_secs: f.max_gap,
@@ -182,7 +182,7 @@ pub fn options(f: &FrameArgs, c: &ConventionArgs, width: u32) -> anyhow::Result<
 }
 
 /// The sources with their formats. A first word that names a format and no file is the format of all that name none.
-pub fn resolve(sources: &[PathBuf]) -> anyhow::Result<Vec<(&'static Format, PathBuf)>> {
+pub fn resolve(sources: &[PathBuf]) -> anyhow::Result<Vec<(&'static ImportFormat, PathBuf)>> {
     let (forced, rest) = match sources {
         [first, rest @ ..] if !first.exists() => match first.to_str().and_then(formats::named) {
             Some(format) => (Some(format), rest),
@@ -236,7 +236,7 @@ pub fn run(args: &ImportArgs) -> anyhow::Result<Answer> {
 }
 
 /// The recording under the options that its own findings ask for, where they are certain.
-fn fixed(captures: &[Capture], mut options: Options) -> anyhow::Result<Imported> {
+fn fixed(captures: &[Capture], mut options: ImportOptions) -> anyhow::Result<Imported> {
     /// Corrections may uncover what they hid: up, after poses that were inverted.
     const ROUNDS: usize = 3;
     let mut done = Vec::new();

@@ -1,5 +1,6 @@
 //! Joints that other programs and data sets have, as arguments and as twins.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -12,7 +13,7 @@ use crate::config::Config;
 use crate::evaluation::scenes::oriented;
 use crate::fitting::joints::{self, Entry, JointsFile, Units};
 use crate::import::articulations::shape::PartBox;
-use crate::import::articulations::{self, Joint, Options, Scene};
+use crate::import::articulations::{self, FoundJoint, JointOptions, JointScene};
 use crate::json;
 use crate::math::Vector;
 use crate::model::{self, furniture};
@@ -50,11 +51,11 @@ impl JointArgs {
     }
 
     /// The joints of a file or folder, or of a URDF or MJCF file; what was taken for granted is told.
-    pub fn read(&self, path: &Path) -> anyhow::Result<Scene> {
+    pub fn read(&self, path: &Path) -> anyhow::Result<JointScene> {
         if self.from.is_none() && is_model(path) {
             return of_model(path);
         }
-        let options = Options { points: self.points.clone(), types: self.types.clone() };
+        let options = JointOptions { points: self.points.clone(), types: self.types.clone() };
         let scene = articulations::read(path, self.from.as_deref(), &options)?;
         for note in &scene.notes {
             eprintln!("{}: {note}", shown(path));
@@ -64,10 +65,9 @@ impl JointArgs {
 
     /// The twin of joints found elsewhere, in our own format or in another one, and up in their file's frame.
     pub fn twin(&self, path: &Path) -> anyhow::Result<(Twin, Vector)> {
-        let config = Config::default().fitting;
+        let config = Config::default();
         if self.from.is_none() && is_ours(path)? {
-            let file: JointsFile = json::read(path)?;
-            return Ok((joints::from_joints(&file, &config).with_context(|| shown(path))?, file.up));
+            return of_ours(path, &config);
         }
         let scene = self.read(path)?;
         let mut left_out: Vec<LeftOut> =
@@ -75,10 +75,7 @@ impl JointArgs {
         let mut file = JointsFile { scene: scene.name.clone(), up: scene.up, units: Units::M, joints: Vec::new() };
         for joint in &scene.joints {
             // Alone first: what is wrong with one joint costs that joint.
-            let built = entry(joint, &scene).and_then(|entry| {
-                let alone = JointsFile { joints: vec![entry.clone()], ..file.clone() };
-                joints::from_joints(&alone, &config).map(|_| entry).map_err(|e| e.to_string())
-            });
+            let built = entry(joint, &scene).and_then(|entry| buildable(&entry, &file, &config).map(|()| entry));
             match built {
                 Ok(entry) => file.joints.push(entry),
                 Err(reason) => left_out.push(LeftOut { id: joint.id.clone(), reason }),
@@ -89,10 +86,58 @@ impl JointArgs {
                 left_out.iter().take(3).map(|left| format!("{}: {}", left.id, left.reason)).collect();
             bail!("{}: no joint of it can be built: {}", shown(path), reasons.join("; "));
         }
-        let mut twin = joints::from_joints(&file, &config).with_context(|| shown(path))?;
+        let mut twin = joints::from_joints(&file, &config.fitting, &config.priors).with_context(|| shown(path))?;
         twin.left_out.extend(left_out);
         Ok((twin, file.up))
     }
+}
+
+/// The twin of a file in our own format, and up in its frame. Where fewer than half of its joints are wrong they cost
+/// themselves; a file of which more is wrong is in another unit, frame or format, and is refused with its first fault.
+fn of_ours(path: &Path, config: &Config) -> anyhow::Result<(Twin, Vector)> {
+    let whole = json::read::<JointsFile>(path).map_err(anyhow::Error::from);
+    let whole = whole.and_then(|file| {
+        let twin = joints::from_joints(&file, &config.fitting, &config.priors).with_context(|| shown(path))?;
+        Ok((twin, file.up))
+    });
+    let refused = match whole {
+        Ok(built) => return Ok(built),
+        Err(refused) => refused,
+    };
+    let mut value: Value = json::read(path)?;
+    let Some(Value::Array(all)) = value.get_mut("joints").map(Value::take) else { return Err(refused) };
+    value["joints"] = Value::Array(Vec::new());
+    let Ok(mut file) = json::of_value::<JointsFile>(&value) else { return Err(refused) };
+    let mut left_out = Vec::new();
+    let mut ids = BTreeSet::new();
+    for (i, joint) in all.iter().enumerate() {
+        let built = json::of_value::<Entry>(joint).and_then(|entry| {
+            buildable(&entry, &file, config)?;
+            if ids.insert(entry.id.clone()) { Ok(entry) } else { Err("id: is used twice".to_owned()) }
+        });
+        match built {
+            Ok(entry) => file.joints.push(entry),
+            Err(reason) => {
+                let id = joint.get("id").and_then(Value::as_str).filter(|id| !id.is_empty());
+                left_out.push(LeftOut { id: id.map_or_else(|| format!("joints[{i}]"), str::to_owned), reason });
+            }
+        }
+    }
+    if 2 * left_out.len() >= all.len() {
+        return Err(refused);
+    }
+    let mut twin = joints::from_joints(&file, &config.fitting, &config.priors).with_context(|| shown(path))?;
+    twin.left_out.extend(left_out);
+    Ok((twin, file.up))
+}
+
+/// Whether a joint can be built, were it alone in its file; why not, behind its name.
+fn buildable(entry: &Entry, file: &JointsFile, config: &Config) -> Result<(), String> {
+    let alone = JointsFile { joints: vec![entry.clone()], ..file.clone() };
+    joints::from_joints(&alone, &config.fitting, &config.priors).map(|_| ()).map_err(|e| {
+        let said = e.to_string();
+        said.strip_prefix(&format!("export: joint {}: ", entry.id)).map_or_else(|| said.clone(), str::to_owned)
+    })
 }
 
 /// Whether a file is a URDF or MJCF, by its name.
@@ -101,14 +146,14 @@ pub fn is_model(path: &Path) -> bool {
 }
 
 /// The joints of a URDF or MJCF file in its world frame, closed.
-fn of_model(path: &Path) -> anyhow::Result<Scene> {
+fn of_model(path: &Path) -> anyhow::Result<JointScene> {
     let (twin, notes) = furniture::to_twin(&model::read(path)?);
     for note in &notes {
         eprintln!("{}: {note}", shown(path));
     }
     let joint = |part: &Part| {
         let (phi, bounds) = (part.joint.articulation, part.bounds);
-        Joint {
+        FoundJoint {
             id: part.id.clone(),
             label: part.label.clone(),
             kind: phi.kind,
@@ -122,7 +167,7 @@ fn of_model(path: &Path) -> anyhow::Result<Scene> {
             score: None,
         }
     };
-    Ok(Scene {
+    Ok(JointScene {
         name: twin.name.clone(),
         format: "model",
         up: Vector::z(),
@@ -130,7 +175,7 @@ fn of_model(path: &Path) -> anyhow::Result<Scene> {
         left_out: twin
             .left_out
             .iter()
-            .map(|left| articulations::LeftOut { place: left.id.clone(), reason: left.reason.clone() })
+            .map(|left| articulations::UnusableJoint { place: left.id.clone(), reason: left.reason.clone() })
             .collect(),
         notes: Vec::new(),
     })
@@ -155,7 +200,7 @@ pub fn is_joints(path: &Path) -> bool {
 }
 
 /// A joint in our own format.
-fn entry(joint: &Joint, scene: &Scene) -> Result<Entry, String> {
+fn entry(joint: &FoundJoint, scene: &JointScene) -> Result<Entry, String> {
     let Some(part) = joint.part.as_ref().map(oriented) else {
         return Err(format!(
             "part_box: is missing: {} tells no shape of this part; write its box in our own format (docs/joints-format.md)",
@@ -179,7 +224,7 @@ fn entry(joint: &Joint, scene: &Scene) -> Result<Entry, String> {
 }
 
 /// How far a part is taken to open, rad or m.
-fn usual(joint: &Joint, part: &OrientedBox) -> f64 {
+fn usual(joint: &FoundJoint, part: &OrientedBox) -> f64 {
     match joint.kind {
         JointKind::Revolute => HINGE_RAD,
         JointKind::Prismatic => {
@@ -207,9 +252,39 @@ mod tests {
         let scene = args.read(&path).unwrap();
         let made = entry(&scene.joints[0], &scene).unwrap();
         assert!((made.range.unwrap()[1] - 0.4).abs() < 1e-12);
-        let bare = Joint { part: None, ..scene.joints[0].clone() };
+        let bare = FoundJoint { part: None, ..scene.joints[0].clone() };
         assert!(entry(&bare, &scene).unwrap_err().starts_with("part_box: is missing: paws"));
         let (twin, up) = args.twin(&path).unwrap();
         assert_eq!((twin.furniture.len(), up), (1, Vector::z()));
+    }
+
+    #[test]
+    fn a_wrong_joint_among_right_ones_costs_itself() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.json");
+        let joint = |id: &str, x: f64, axis: &str| {
+            format!(
+                r#"{{"id": "{id}", "type": "prismatic", "axis": {axis}, "origin": [{x},0,1], "range": [0, 0.3],
+                "part_box": {{"center": [{x},0,1], "half": [0.3,0.25,0.1], "R": [[1,0,0],[0,1,0],[0,0,1]]}}}}"#
+            )
+        };
+        let twin = |wrong: &[String]| {
+            let good = [joint("a", 0.0, "[0,1,0]"), joint("b", 2.0, "[0,1,0]")];
+            let text = format!(r#"{{"scene": "s", "joints": [{}]}}"#, [&good[..], wrong].concat().join(","));
+            std::fs::write(&path, text).unwrap();
+            JointArgs::default().twin(&path).map(|(twin, _)| twin).map_err(|e| format!("{e:#}"))
+        };
+        for (wrong, id, reason) in [
+            (joint("c", 4.0, "[0,0,0]"), "c", "axis: has length 0.0000"),
+            (joint("a", 4.0, "[0,1,0]"), "a", "id: is used twice"),
+            (joint("c", 4.0, "[0,1,0]").replace("\"R\"", "\"Q\""), "c", "part_box: the key \"R\" is missing"),
+            ("7".to_owned(), "joints[2]", "the number 7 is given"),
+        ] {
+            let made = twin(&[wrong]).unwrap();
+            assert_eq!((made.furniture.len(), made.left_out.len()), (2, 1), "{:?}", made.left_out);
+            assert!(made.left_out[0].id == id && made.left_out[0].reason.contains(reason), "{:?}", made.left_out);
+        }
+        let two = [joint("c", 4.0, "[0,0,0]"), joint("d", 6.0, "[0,2,0]")];
+        assert!(twin(&two).unwrap_err().contains("joint c: axis: has length 0"), "half of the joints are wrong");
     }
 }

@@ -130,8 +130,9 @@ fn marked_image(
         Rgb(grid.get(x as usize, y as usize).unwrap_or_default())
     });
     let camera_from_world = seen.world_from_camera.inverse();
+    let camera = recording.camera_of(frame);
     let mut draw = |a: &Point, b: &Point, color: Rgb<u8>, half: i64| {
-        stroke(&mut image, &recording.camera, &(camera_from_world * a), &(camera_from_world * b), color, half);
+        stroke(&mut image, camera, &(camera_from_world * a), &(camera_from_world * b), color, half);
     };
     for line in &clip.lines {
         let [a, b] = line.segment.ends();

@@ -31,7 +31,7 @@ pub fn read(dir: &Path, twin: &Twin) -> anyhow::Result<Option<Look>> {
         return Ok(None);
     }
     let bytes = std::fs::read(&path).with_context(|| shown(&path))?;
-    let file = gltf::Gltf::from_slice(&bytes).with_context(|| shown(&path))?;
+    let file = crate::import::formats::cloud::document(&path, &bytes)?;
     let blob = file.blob.as_deref().unwrap_or_default();
     let mut look = Look::default();
     for image in file.images() {

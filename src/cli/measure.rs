@@ -1,4 +1,4 @@
-//! `paws measure`: what the steps before the joint inference are worth.
+//! `paws measure`: what the steps before the joint inference, and the boxes of the room, are worth.
 
 use std::path::PathBuf;
 
@@ -6,8 +6,10 @@ use clap::Args;
 
 use super::output::write_file;
 use super::progress::Steps;
-use super::{Answer, ConfigFile, Opening, print};
+use super::{Answer, ConfigFile, Opening, evaluate, print};
+use crate::evaluation::room_fit;
 use crate::evaluation::stages::{SceneTruth, Stages, measure, measure_segments};
+use crate::fitting;
 use crate::geometry::segments::Lsd;
 use crate::json;
 use crate::math::stats;
@@ -34,19 +36,19 @@ pub struct MeasureArgs {
 
 pub fn run(args: &MeasureArgs) -> anyhow::Result<Answer> {
     let config = args.config.read()?;
-    let mut opened = Vec::new();
-    for dir in &args.recordings {
-        opened.push((args.opening.open(dir)?, SceneTruth::read(dir)?));
-    }
+    let opened =
+        evaluate::opened(&args.recordings, |folder| Ok((args.opening.open(folder)?, SceneTruth::read(folder)?)))?;
     let mut rows = vec![HEADER.map(str::to_owned).to_vec()];
     let mut all: Vec<Stages> = Vec::new();
     let steps = Steps::new();
     for (i, (recording, truth)) in opened.iter().enumerate() {
         steps.report("measuring", i, opened.len());
-        let reasoner = Geometric { reasoning: config.reasoning.clone(), inference: config.inference.clone() };
+        let reasoner = Geometric::of(&config);
         let scene = pipeline::infer(recording, &config, &Lsd, &reasoner, &|_, _, _| {})?;
         let mut stages = measure(&scene, truth);
         measure_segments(recording, truth, &Lsd, &mut stages)?;
+        let twin = fitting::fit(&scene, &recording.up(), &config.fitting, &config.priors);
+        stages.room = room_fit::measure(recording, &scene, &twin, &config.fitting)?;
         if args.each {
             rows.push(row(&recording.name, &stages));
         }
@@ -58,10 +60,10 @@ pub fn run(args: &MeasureArgs) -> anyhow::Result<Answer> {
     if let Some(path) = &args.json {
         write_file(path, json::text(&all)?)?;
     }
-    Ok(Answer::Yes)
+    Ok(if opened.len() == args.recordings.len() { Answer::Yes } else { Answer::No })
 }
 
-const HEADER: [&str; 11] = [
+const HEADER: [&str; 15] = [
     "recordings",
     "clips",
     "localised",
@@ -73,10 +75,15 @@ const HEADER: [&str; 11] = [
     "room frame off by",
     "front covered",
     "depth scale off by",
+    "room boxes",
+    "air filled",
+    "surface missing",
+    "openings blocked",
 ];
 
 fn row(name: &str, s: &Stages) -> Vec<String> {
     let share = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.2}"));
+    let percent = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{:.1} %", 100.0 * v));
     let best = s.best_line();
     let median = |values: &[f64]| stats::median(values);
     vec![
@@ -90,6 +97,10 @@ fn row(name: &str, s: &Stages) -> Vec<String> {
         share(s.precision()),
         median(&s.manhattan_rad).map_or("-".to_owned(), |a| format!("{:.2}°", a.to_degrees())),
         share(median(&s.coverage)),
-        median(&s.depth_scale_error).map_or("-".to_owned(), |e| format!("{:.1} %", 100.0 * e)),
+        percent(median(&s.depth_scale_error)),
+        s.room.room_boxes.to_string(),
+        percent(s.room.filled()),
+        percent(s.room.missing()),
+        s.room.blocked_openings.to_string(),
     ]
 }

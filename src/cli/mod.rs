@@ -10,8 +10,10 @@ macro_rules! eprintln {
 
 mod ablate;
 mod batch;
+mod cache;
 mod calls;
 mod check;
+mod compare;
 mod config;
 mod demo;
 mod door;
@@ -19,16 +21,19 @@ mod evaluate;
 mod evaluate_joints;
 mod export;
 mod foreign;
+mod frames;
 mod import;
 mod infer;
 mod joints;
 mod keep;
 mod look;
+mod many;
 mod measure;
 mod moved;
 mod output;
 mod perceive;
 mod perceive_package;
+mod perceive_streams;
 mod primitives;
 mod progress;
 mod synth;
@@ -36,10 +41,12 @@ mod twin;
 mod units;
 mod validate;
 mod words;
+mod workers;
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Args, Parser, Subcommand};
 
@@ -70,9 +77,10 @@ impl Answer {
 #[command(
     name = "paws",
     version,
-    about = "From an egocentric recording of opened doors and drawers to a kitchen that simulates",
-    after_help = "Start with `paws demo`. A recording is a folder (docs/recording-format.md); \
-                  exit codes: 0 done, 1 ran but the answer is no or not whole, 2 error."
+    about = "Turns a recording of somebody opening doors and drawers into a simulated kitchen",
+    after_help = "Start with `paws demo`. Your own recording: `paws perceive SCAN --out rec`, then `paws twin rec --out twin`.\n\
+                  Exit codes: 0 done; 1 done, but a joint failed, a check did, nothing was found or something was left out; \
+                  2 error."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -81,41 +89,46 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    // The help lists them in this order: what makes a twin, what uses one, what measures the method.
     /// Render a recording of a kitchen, make its twin and say where to look
     Demo(demo::DemoArgs),
-    /// Make a recording of what a device, a data set or a network wrote
+    /// Make a recording: convert files of devices, data sets and networks, which hold poses and hands
     Import(Box<import::ImportArgs>),
-    /// Make a recording of a video or a phone's scan: the streams that it lacks by open networks
+    /// Make a recording: convert such files, or a video, and find missing hands, poses and depth by open networks
     Perceive(Box<perceive::PerceiveArgs>),
     /// Make a simulated, validated twin from a recording
     Twin(twin::TwinArgs),
     /// Make the twins of many recordings; a run that was killed goes on where it was
     Batch(batch::BatchArgs),
-    /// Infer joints from recordings, or from a bare trajectory
+    /// List the frames of a recording that `paws twin` reads: networks need see no others
+    Frames(frames::FramesArgs),
+    /// Infer joints alone, without a twin, from recordings or from a bare trajectory
     Infer(infer::InferArgs),
-    /// Write a twin, or joints that another program found, as URDF, MJCF, glTF and USD
+    /// Use a twin: write it, or joints that another program found, as URDF, MJCF, glTF and USD
     Export(export::ExportArgs),
-    /// Check a model without simulating it: limits, masses, names, collisions, missing files of anybody's URDF, MJCF or glTF
+    /// Use a twin or any model: check its file without simulating it (limits, masses, names, collisions, missing files)
     Check(check::CheckArgs),
-    /// Replay recorded hands on the joints of a twin, or of anybody's URDF or MJCF, in a physics engine
+    /// Use a twin or any model: replay recorded hands on its joints in a physics engine
     Validate(validate::ValidateArgs),
-    /// Compare predictions with the truth
+    /// Use a twin: measure how it looks beside the recorded frames, and its shape beside a truth
+    Compare(compare::CompareArgs),
+    /// Research: count how many predicted joints are right, by a truth
     Evaluate(evaluate::EvaluateArgs),
-    /// Compare configurations on recordings with a truth: what each choice is worth
+    /// Research: run several configurations on recordings with a truth, to see what each choice is worth
     Ablate(ablate::AblateArgs),
-    /// Measure the steps before the joint inference on recordings with a truth
+    /// Research: measure the steps before the joint (hands, contact, lines, faces) by a truth
     Measure(measure::MeasureArgs),
-    /// Write a recording of a synthetic kitchen with a known answer
+    /// Research: write a recording of a synthetic kitchen with its truth
     Synth(synth::SynthArgs),
-    /// Print every parameter with its value, unit and source
+    /// Print every parameter with its value, unit, source and meaning
     Config(config::ConfigArgs),
 }
 
 /// Arguments of all commands that run steps of the pipeline.
 #[derive(Debug, Clone, Default, Args)]
 pub struct ConfigFile {
-    /// Parameters to change, as TOML (`paws config --toml` prints all of them), or a word: `paper` is the paper's PAWS, every
-    /// clip for itself, `paper_s` its PAWS-s, clips of one part together
+    /// Parameters to change: a TOML file (`paws config --toml` prints all of them), or `paper` (the paper's method, each clip
+    /// alone), or `paper_s` (the paper's, clips of one part together)
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
 }
@@ -134,8 +147,8 @@ impl ConfigFile {
 /// Arguments of all commands that read recordings.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub struct Opening {
-    /// Read files of a recording that lie outside of its folder, too, where links or the paths in cameras.json lead there;
-    /// else they are an error, as pictures may travel to a language model
+    /// Also read files outside the recording's folder, where links or the paths in cameras.json lead there; otherwise they are
+    /// an error, because pictures may be sent to a language model
     #[arg(long)]
     follow_links: bool,
 }
@@ -153,6 +166,12 @@ impl Opening {
                 repeated.len()
             );
         }
+        for note in &recording.left_out.notes {
+            eprintln!("{}: {note}", shown(dir));
+        }
+        for (clip, why) in &recording.left_out.clips {
+            eprintln!("{}: clips.json: clip {} is left out: {why}", shown(dir), clip.clip);
+        }
         Ok(recording)
     }
 }
@@ -166,13 +185,21 @@ fn with_clips(mut recording: Recording, dir: &Path) -> Recording {
     recording
 }
 
-/// Runs the command line of this process.
+/// Whether this process is the program `paws`: then its executable is.
+static IS_PROGRAM: AtomicBool = AtomicBool::new(false);
+
+fn is_program() -> bool {
+    IS_PROGRAM.load(Ordering::Relaxed)
+}
+
+/// Runs the command line of this process, which is the program `paws`.
 #[must_use]
 pub fn run() -> ExitCode {
+    IS_PROGRAM.store(true, Ordering::Relaxed);
     ExitCode::from(run_with(std::env::args_os()))
 }
 
-/// Runs a command line, the program's name first, and answers with the exit code. It prints, help and errors included.
+/// Runs a command line in any program, the name of `paws` first, and answers with the exit code. It prints, help and errors included.
 #[must_use]
 pub fn run_with(args: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = match Cli::try_parse_from(args) {
@@ -206,10 +233,12 @@ fn answer_of(cli: Cli) -> anyhow::Result<Answer> {
         Command::Perceive(args) => perceive::run(&args),
         Command::Twin(args) => twin::run(&args),
         Command::Batch(args) => batch::run(&args),
+        Command::Frames(args) => frames::run(&args),
         Command::Infer(args) => infer::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Validate(args) => validate::run(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Ablate(args) => ablate::run(&args),
         Command::Measure(args) => measure::run(&args),

@@ -5,16 +5,24 @@ use std::path::Path;
 use anyhow::bail;
 
 use super::shown;
-use crate::articulation::{Action, JointKind};
-use crate::inference::openings;
-use crate::math::Point;
-use crate::model::{Format, Model};
+use crate::articulation::{Action, Articulation, JointKind};
+use crate::config;
+use crate::inference::{bare, openings};
+use crate::math::{Point, Vector, path, rounded, unsigned_angle};
+use crate::model::{Model, ModelFormat};
 use crate::recording::trajectory::BareTrajectory;
 use crate::twin::{OrientedBox, Part, Twin};
 use crate::validation::rivals::path_distance2;
 
 /// A point of a part is no further from its boxes, metres: fingers, and shapes that are not in the file.
 const ON_PART_M: f64 = 0.05;
+/// Who never comes nearer to a part holds nothing of it, metres, whatever its joint is: handles and markers stand out by less.
+const OFF_PART_M: f64 = 0.3;
+/// A path that goes there and back goes further than this, metres.
+const BACK_M: f64 = 0.03;
+/// So far apart are the farthest of many samples of a still hand, in root mean squares of its noise across a path: three
+/// standard deviations to each side.
+const NOISE_SPREAD: f64 = 4.0;
 
 /// What a path does to a part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,8 +45,10 @@ pub fn motion(part: &Part, points: &[Point]) -> Motion {
     let net = along.last().copied().unwrap_or(0.0);
     let extreme =
         |sign: f64| along.iter().map(|q| sign * q).enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0));
-    let ((_, up), (lowest, down)) = (extreme(1.0), extreme(-1.0));
-    if net.abs() < 0.5 * (up + down) {
+    let ((highest, up), (lowest, down)) = (extreme(1.0), extreme(-1.0));
+    let lever = |i: usize| points.get(i).map_or(0.0, |p| phi.lever(p));
+    let spread_m = up * lever(highest) + down * lever(lowest);
+    if net.abs() < 0.5 * (up + down) && spread_m > BACK_M.max(NOISE_SPREAD * path::beside_any_joint(points)) {
         // There and back.
         return if up >= down { all } else { Motion { action: Action::Close, samples: lowest + 1 } };
     }
@@ -110,33 +120,117 @@ pub fn check_times(file: &Path, recorded: &BareTrajectory) -> anyhow::Result<()>
         crate::math::stats::quantile(&all, 0.95).unwrap_or(0.0)
     });
     if farthest > FASTEST * seconds && recorded.positions.len() > 1 {
-        bail!("{}: the hand goes {farthest:.2} m in {seconds:.2e} s: {way_out}", shown(file));
+        bail!("{}: the hand goes {} m in {seconds:.2e} s: {way_out}", shown(file), rounded(farthest, 2));
     }
     Ok(())
 }
 
-/// Refuses a path that is nowhere near the part that it is said to have moved, and limits that the path shows to be radians
-/// which were read as degrees.
+/// Refuses a path that is nowhere on the part that it is said to have moved, be it that it is in another frame, and limits that
+/// the path shows to be radians which were read as degrees. A path that is beside the part is told.
 pub fn check_place(file: &Path, model: Option<&Model>, part: &Part, points: &[Point]) -> anyhow::Result<()> {
-    // Between two of these openings a part moves by less than its own size.
-    const STEPS: u32 = 12;
-    let phi = part.joint.articulation;
-    let ways: Vec<_> =
-        (0..=STEPS).map(|k| phi.motion(part.joint.upper * f64::from(k) / f64::from(STEPS)).inverse()).collect();
-    let near = points
-        .iter()
-        .flat_map(|p| ways.iter().map(move |back| from_box(&part.bounds, &(back * p))))
-        .fold(f64::INFINITY, f64::min);
-    // Who never comes nearer than a whole part's size holds nothing of it, whatever its joint is.
-    let size = (2.0 * part.bounds.half.norm()).max(0.5);
-    if near > size {
+    check_limits(file, model, part, points)?;
+    if let Some(where_it_is) = same_arc_elsewhere(part, points) {
         bail!(
-            "{}: the path never comes nearer to {} than {near:.1} m; it must be in the model's world frame and in metres \
-             (--units mm, --units cm; JOINT=FILE where it moved another part)",
+            "{}: the path is such an arc as {} makes, but {where_it_is}; it must be in the model's world frame",
             shown(file),
             part.label
         );
     }
+    let near = distance(part, points);
+    if near > OFF_PART_M {
+        bail!(
+            "{}: the path never comes nearer to {} than {} m; it must be in the model's world frame and in metres \
+             (--units mm, --units cm; JOINT=FILE where it moved another part)",
+            shown(file),
+            part.label,
+            rounded(near, 1)
+        );
+    }
+    if near > ON_PART_M {
+        eprintln!(
+            "{}: the path never comes nearer to {} than {:.0} cm: is it in the model's world frame?",
+            shown(file),
+            part.label,
+            100.0 * near
+        );
+    }
+    Ok(())
+}
+
+/// How near a path comes to a part, metres, wherever between closed and open that is.
+fn distance(part: &Part, points: &[Point]) -> f64 {
+    // Between two of these openings a door's edge moves by less than a finger's length.
+    const STEPS: u32 = 48;
+    // More points of a path tell nothing new.
+    const POINTS: usize = 500;
+    let phi = part.joint.articulation;
+    let ways: Vec<_> =
+        (0..=STEPS).map(|k| phi.motion(part.joint.upper * f64::from(k) / f64::from(STEPS)).inverse()).collect();
+    points
+        .iter()
+        .step_by(points.len().div_ceil(POINTS).max(1))
+        .flat_map(|p| ways.iter().map(move |back| from_box(&part.bounds, &(back * p))))
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// Where the arc of a path lies, in words, that a hinge's part could have made if the hinge were there: about another axis or
+/// beside the hinge, and not begun or ended at the closed part, or behind it. `None` where the path is none. A path that begins
+/// at the closed part and leaves it to the front may be that of another joint, which is what a replay tells.
+fn same_arc_elsewhere(part: &Part, points: &[Point]) -> Option<String> {
+    // What differs by less is taken for the same, as shares and in metres.
+    const SAME: f64 = 0.1;
+    const SAME_M: f64 = 0.03;
+    // From here on another axis is up, radians: 30 degrees.
+    const TURNED: f64 = 0.52;
+    let own = part.joint.articulation;
+    if own.kind != JointKind::Revolute {
+        return None;
+    }
+    let recorded = BareTrajectory { positions: points.to_vec(), ..BareTrajectory::default() };
+    let inference = config::Inference::default();
+    let outcome = bare::infer(&recorded, &inference);
+    let arc = outcome.found().filter(|j| j.joint.kind == JointKind::Revolute)?;
+    let (radius, handle) = (arc.circle_radius_m?, own.lever(&part.handle));
+    let is_such = arc.residual_m <= inference.prismatic_tolerance_m
+        && (radius - handle).abs() <= SAME_M.max(SAME * handle)
+        && arc.range <= (1.0 + SAME) * part.joint.upper;
+    let ends = [points.first()?, points.last()?];
+    let begins_closed = ends.iter().any(|p| from_box(&part.bounds, p) <= 2.0 * ON_PART_M);
+    if !is_such {
+        return None;
+    }
+    if unsigned_angle(&arc.joint.axis, &own.axis) > TURNED {
+        let axes = [axis_words(&arc.joint), axis_words(&own)];
+        return (!begins_closed).then(|| format!("about {} instead of {} (is another axis up?)", axes[0], axes[1]));
+    }
+    let beside = own.line().distance(&arc.joint.origin);
+    let is_elsewhere = beside > SAME_M.max(0.5 * radius) && (!begins_closed || is_behind(part, points));
+    is_elsewhere.then(|| format!("{beside:.1} m beside its hinge (is the world turned or moved?)"))
+}
+
+/// Whether a path lies where the part does not go when it opens.
+fn is_behind(part: &Part, points: &[Point]) -> bool {
+    let own = part.joint.articulation;
+    let opening: Vector = own.axis.cross(&(part.handle - own.line().project(&part.handle)));
+    let before = |p: &Point| (p - part.bounds.center).dot(&opening) / opening.norm().max(1e-9);
+    let mean = points.iter().map(before).sum::<f64>() / points.len().max(1) as f64;
+    mean < -ON_PART_M
+}
+
+/// The direction of a joint's axis for people: `Y` where it is nearly that, else its numbers.
+fn axis_words(joint: &Articulation) -> String {
+    // Within 15 degrees.
+    const NEARLY: f64 = 0.96;
+    let axis = joint.axis;
+    match (0..3).find(|k| axis[*k].abs() > NEARLY) {
+        Some(k) => ["X", "Y", "Z"].get(k).map_or_else(String::new, |name| (*name).to_owned()),
+        None => format!("({:.2} {:.2} {:.2})", axis.x, axis.y, axis.z),
+    }
+}
+
+/// Refuses limits that the path shows to be radians which were read as degrees.
+fn check_limits(file: &Path, model: Option<&Model>, part: &Part, points: &[Point]) -> anyhow::Result<()> {
+    let phi = part.joint.articulation;
     let along = points.first().map_or_else(Vec::new, |first| openings(&phi, first, points));
     let range =
         along.iter().copied().fold(f64::NEG_INFINITY, f64::max) - along.iter().copied().fold(f64::INFINITY, f64::min);
@@ -144,7 +238,9 @@ pub fn check_place(file: &Path, model: Option<&Model>, part: &Part, points: &[Po
     let few = std::f64::consts::PI.to_radians();
     if phi.kind == JointKind::Revolute && part.joint.upper < few && range > 10.0 * part.joint.upper {
         let why = match model.map(|m| m.format.clone()) {
-            Some(Format::Mjcf { radian: false }) => "the file's angles are degrees; write <compiler angle=\"radian\"/>",
+            Some(ModelFormat::Mjcf { radian: false, .. }) => {
+                "the file's angles are degrees; write <compiler angle=\"radian\"/>"
+            }
             _ => "are its limits degrees that were converted twice? they must be radians here",
         };
         bail!(
@@ -200,6 +296,45 @@ mod tests {
             let mut back = path(part, &held, far, 0.0);
             back.extend(path(part, &held, 0.0, far).into_iter().skip(1));
             assert_eq!(motion(part, &back), Motion { action: Action::Close, samples: 41 });
+        }
+    }
+
+    #[test]
+    fn noise_along_a_path_that_does_not_move_the_joint_cuts_it_nowhere() {
+        let twin = twin(TWO);
+        let part = &twin.furniture[1].part;
+        // Away from the hinge, shaken by millimetres.
+        let shaken = |k: u32| 0.006 * (f64::from(k * 7 % 11) / 10.0 - 0.5);
+        let pulled: Vec<Point> =
+            (0..=60).map(|k| Point::new(0.1 + f64::from(k) / 150.0, shaken(k), 0.7 + shaken(k + 3))).collect();
+        assert_eq!(motion(part, &pulled).samples, pulled.len());
+    }
+
+    #[test]
+    fn a_path_in_another_frame_is_refused_with_what_is_odd_about_it() {
+        let twin = twin(TWO);
+        let part = &twin.furniture[1].part;
+        let held = part.handle;
+        let opened = path(part, &held, 0.0, 1.2);
+        let said = |points: &[Point]| {
+            check_place(Path::new("p.txt"), None, part, points).map_or_else(|e| e.to_string(), |()| "fine".to_owned())
+        };
+        let moved = |by: &dyn Fn(&Point) -> Point| -> Vec<Point> { opened.iter().map(by).collect() };
+        assert_eq!(said(&opened), "fine");
+        for (points, word) in [
+            (moved(&|p| Point::new(p.x, p.y, p.z + 1.2)), "never comes nearer"),
+            (moved(&|p| Point::new(p.x, p.z, -p.y)), "is another axis up?"),
+            (moved(&|p| Point::new(-p.x, -p.y, p.z)), "turned or moved?"),
+            (moved(&|p| Point::new(-p.y, p.x, p.z)), "turned or moved?"),
+        ] {
+            assert!(said(&points).contains(word), "{word}: {}", said(&points));
+        }
+        // Another joint of the same part is no other frame: a flap, and a door hinged on the other side.
+        let flap = Articulation { axis: Vector::x(), origin: Point::new(0.0, 0.0, 0.5), ..part.joint.articulation };
+        let right = Articulation { axis: Vector::z(), origin: Point::new(0.3, 0.0, 0.7), ..part.joint.articulation };
+        for (joint, held) in [(flap, Point::new(0.0, 0.0, 0.88)), (right, Point::new(-0.28, 0.0, 0.7))] {
+            let other: Vec<Point> = (0..=40).map(|i| joint.motion(0.03 * f64::from(i)) * held).collect();
+            assert_eq!(said(&other), "fine");
         }
     }
 

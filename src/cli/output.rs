@@ -20,6 +20,8 @@ pub enum Kind {
     Twin,
     /// A synthetic recording.
     Recording,
+    /// Pictures of a twin beside the recorded frames.
+    Comparison,
 }
 
 impl Kind {
@@ -28,6 +30,7 @@ impl Kind {
         match self {
             Self::Twin => ".paws-twin",
             Self::Recording => ".paws-recording",
+            Self::Comparison => ".paws-comparison",
         }
     }
 }
@@ -112,7 +115,7 @@ impl Drop for Output {
 }
 
 /// Kinds of folders that carry a marker.
-const MARKED: [Kind; 2] = [Kind::Twin, Kind::Recording];
+const MARKED: [Kind; 3] = [Kind::Twin, Kind::Recording, Kind::Comparison];
 
 /// Words in the names of what is being written, and of what is being replaced.
 const PARTIAL: &str = "partial";

@@ -15,22 +15,34 @@ macro_rules! files {
     };
 }
 
-const FILES: [(&str, &str); 17] = files![
+const FILES: [(&str, &str); 29] = files![
     "pyproject.toml",
     "uv.lock",
     "src/paws_perceive/__init__.py",
     "src/paws_perceive/__main__.py",
     "src/paws_perceive/adapters/__init__.py",
+    "src/paws_perceive/adapters/deeplsd_lines.py",
+    "src/paws_perceive/adapters/depth_anything_poses.py",
+    "src/paws_perceive/adapters/limap_lines.py",
+    "src/paws_perceive/adapters/mapanything_poses.py",
     "src/paws_perceive/adapters/mediapipe_hands.py",
+    "src/paws_perceive/adapters/moge_depth.py",
     "src/paws_perceive/adapters/pycolmap_poses.py",
     "src/paws_perceive/adapters/transformers_depth.py",
+    "src/paws_perceive/adapters/transformers_masks.py",
+    "src/paws_perceive/adapters/wilor_hands.py",
+    "src/paws_perceive/batches.py",
     "src/paws_perceive/cache.py",
+    "src/paws_perceive/colmap_text.py",
     "src/paws_perceive/depth.py",
     "src/paws_perceive/exr.py",
     "src/paws_perceive/geometry.py",
     "src/paws_perceive/hands.py",
+    "src/paws_perceive/lines.py",
+    "src/paws_perceive/masks.py",
     "src/paws_perceive/plan.py",
     "src/paws_perceive/poses.py",
+    "src/paws_perceive/poses_io.py",
     "src/paws_perceive/recording.py",
     "src/paws_perceive/tracks.py",
 ];
@@ -77,6 +89,11 @@ impl Python {
             },
         };
         Ok(Self { runner, package: unpacked()? })
+    }
+
+    /// Whether uv runs the package, and gets what its extras name.
+    pub fn is_uv(&self) -> bool {
+        self.runner == Runner::Uv
     }
 
     /// The package's command, without arguments. `extra`: whose packages it needs, of `pyproject.toml`; `None`: none.

@@ -6,9 +6,9 @@ use std::path::Path;
 use anyhow::bail;
 
 use super::shown;
-use super::twin::JointHands;
 use crate::evaluation::Predictions;
 use crate::json;
+use crate::make::JointHands;
 use crate::primitives::Seen;
 
 /// The recorded hands of a twin's folder; none where it has no recording.

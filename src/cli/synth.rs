@@ -8,7 +8,7 @@ use clap::Args;
 use super::output::{Kind, Output};
 use super::progress::Steps;
 use super::{Answer, print, shown};
-use crate::synth::{self, Changes, Options, Tier};
+use crate::synth::{self, Changes, SynthOptions, Tier};
 use crate::{export, json};
 
 #[derive(Debug, Args)]
@@ -46,6 +46,16 @@ pub struct SynthArgs {
     /// Write no masks
     #[arg(long)]
     no_masks: bool,
+    /// Which take of the kitchen of this seed: the same kitchen and parts, other motions, views and errors
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    take: u64,
+    /// A world of the recording's own, as every start of a headset makes one: turned and moved, which ground_truth.json tells.
+    /// Otherwise all takes of a kitchen have one world
+    #[arg(long)]
+    own_frame: bool,
+    /// Surfaces of wood, tiles, stone and brushed steel in the place of flat colours; all but the pictures stays the same bytes
+    #[arg(long)]
+    materials: bool,
     /// Folder for the recording
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -56,7 +66,8 @@ pub struct SynthArgs {
 }
 
 pub fn run(args: &SynthArgs) -> anyhow::Result<Answer> {
-    let options = Options { seed: args.seed, tier: args.tier, width: args.width as usize, parts: args.parts as usize };
+    let options =
+        SynthOptions { seed: args.seed, tier: args.tier, width: args.width as usize, parts: args.parts as usize };
     let changes = Changes {
         clips_per_part: args.clips_per_part.map(|n| n as usize),
         hand_noise_m: args.hand_noise.map(|cm| 0.01 * cm),
@@ -65,6 +76,9 @@ pub fn run(args: &SynthArgs) -> anyhow::Result<Answer> {
         word_error: args.word_error,
         mask_error: args.mask_error,
         no_masks: args.no_masks,
+        take: args.take,
+        own_world: args.own_frame,
+        materials: args.materials,
     };
     if let Some(kitchen) = &args.kitchen {
         let [a, b] = [std::path::absolute(kitchen)?, std::path::absolute(&args.out)?];
@@ -73,7 +87,7 @@ pub fn run(args: &SynthArgs) -> anyhow::Result<Answer> {
         }
         write_kitchen(&options, &changes, kitchen)?;
     }
-    write_varied(&options, &changes, &args.out)?;
+    write(&options, &changes, &args.out)?;
     for made in args.kitchen.iter().chain([&args.out]) {
         print(&format!("{}\n", shown(made)))?;
     }
@@ -81,7 +95,7 @@ pub fn run(args: &SynthArgs) -> anyhow::Result<Answer> {
 }
 
 /// Writes the true kitchen into a folder.
-fn write_kitchen(options: &Options, changes: &Changes, out: &Path) -> anyhow::Result<()> {
+fn write_kitchen(options: &SynthOptions, changes: &Changes, out: &Path) -> anyhow::Result<()> {
     let output = Output::new(out, Kind::Twin, &[])?;
     let recording = synth::Recorded::varied(options, changes)?;
     let twin = recording.twin();
@@ -94,11 +108,7 @@ fn write_kitchen(options: &Options, changes: &Changes, out: &Path) -> anyhow::Re
 }
 
 /// Renders a recording into a folder.
-pub fn write(options: &Options, out: &Path) -> anyhow::Result<()> {
-    write_varied(options, &Changes::default(), out)
-}
-
-fn write_varied(options: &Options, changes: &Changes, out: &Path) -> anyhow::Result<()> {
+pub fn write(options: &SynthOptions, changes: &Changes, out: &Path) -> anyhow::Result<()> {
     let output = Output::new(out, Kind::Recording, &[])?;
     let recording = synth::Recorded::varied(options, changes)?;
     for (name, text) in recording.tables()? {

@@ -7,28 +7,30 @@ use anyhow::bail;
 use clap::Args;
 
 use super::door::Door;
+use super::many::Given;
 use super::output::{Kind, Output};
 use super::progress::Steps;
 use super::words::{self as model, Asked, WordsArgs};
-use super::{Answer, ConfigFile, Opening, keep, print, shown};
-use crate::config::{self, Config};
-use crate::hands::Trajectory;
+use super::{Answer, ConfigFile, Opening, cache, keep, print, shown};
+use crate::config::Config;
+use crate::export::{ExportFormat, FORMATS, Purpose};
 use crate::json;
 use crate::look::Look;
-use crate::math::Vector;
+use crate::make;
 use crate::pipeline::{self, Scene};
-use crate::recording::Recording;
-use crate::report::page::FileNote;
+use crate::recording::{LeftOut, Recording, origin};
+use crate::report::page::{FileNote, PageContext};
 use crate::report::table::aligned;
-use crate::report::{files, page, pictures, words};
+use crate::report::{drawings, files, page, page_frames, phrases};
 use crate::twin::Twin;
-use crate::validation::{self, Validation, Verdict, verdict::Hands};
-use crate::{export, fitting, primitives};
+use crate::validation::{Validation, Verdict};
+use crate::{fitting, primitives};
 
 #[derive(Debug, Args)]
 pub struct TwinArgs {
-    /// The recording's folder
-    recording: PathBuf,
+    /// The recording's folder; of several recordings of one place all folders, in the order of time: one twin of all of them
+    #[arg(required = true, value_name = "RECORDING")]
+    recordings: Vec<PathBuf>,
     /// Folder for the twin
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -42,9 +44,16 @@ pub struct TwinArgs {
     /// model) in DIR/steps
     #[arg(long)]
     keep: bool,
-    /// Leave the furniture and the room the plain boxes that they collide as
+    /// Show plain boxes: no textures from the images, and no recorded frames on the page
     #[arg(long)]
     no_textures: bool,
+    /// The recordings already share one world (poses of one map): do not align them
+    #[arg(long)]
+    one_frame: bool,
+    /// Keep intermediate results in DIR; a later run, such as one with one more recording, reuses them. The twin is the same
+    /// with and without
+    #[arg(long, value_name = "DIR")]
+    cache: Option<PathBuf>,
     #[command(flatten)]
     words: WordsArgs,
     /// End when standard input does: for programs that start this one, so that it does not outlive them
@@ -55,17 +64,8 @@ pub struct TwinArgs {
 /// The folder of a look's files, as pages name it.
 const LOOK: &str = "look/";
 
-const FILES: [FileNote; 18] = [
-    FileNote { name: "scene.urdf", what: "the twin for ROS, PyBullet, Drake, Pinocchio" },
-    FileNote { name: "scene.xml", what: "the twin for MuJoCo, with floor, light and keyframes" },
-    FileNote {
-        name: "kitchen.xml",
-        what: "the same without floor and light, to include in a MuJoCo scene of your own",
-    },
-    FileNote { name: "scene.glb", what: "the twin for viewers and game engines, with an animation per joint" },
-    FileNote { name: "physics.glb", what: "the twin for engines that read KHR_physics_rigid_bodies" },
-    FileNote { name: "scene.usda", what: "the twin for Isaac and OpenUSD, with UsdPhysics" },
-    FileNote { name: "scene.usdz", what: "the same with its pictures in one file, also for phones" },
+/// Files of the folder that are no exports.
+const OTHER_FILES: [FileNote; 11] = [
     FileNote { name: LOOK, what: "meshes and pictures that scene.urdf, scene.xml, kitchen.xml and scene.usda show" },
     FileNote { name: "index.html", what: "this page" },
     FileNote { name: "articulations.json", what: "every joint and every clip with its evidence" },
@@ -82,6 +82,17 @@ const FILES: [FileNote; 18] = [
     FileNote { name: "steps/", what: "intermediate results, with --keep" },
 ];
 
+/// The formats that every twin's folder has.
+fn model_formats() -> Vec<&'static ExportFormat> {
+    FORMATS.iter().filter(|format| format.purpose == Purpose::Model).collect()
+}
+
+/// The files of a twin's folder, in the page's order.
+fn file_notes() -> Vec<FileNote> {
+    let models = model_formats().into_iter().flat_map(|format| format.files);
+    models.map(|file| FileNote { name: file.name, what: file.what }).chain(OTHER_FILES).collect()
+}
+
 /// Ends this process when its standard input ends, which it does when the program at its other end is gone.
 fn end_with_parent() {
     std::thread::spawn(|| {
@@ -95,10 +106,20 @@ pub fn run(args: &TwinArgs) -> anyhow::Result<Answer> {
         end_with_parent();
     }
     let (config, asked) = (args.config.read()?, args.words.open()?);
+    let given = Given {
+        recordings: &args.recordings,
+        opening: args.opening,
+        door: args.door,
+        one_frame: args.one_frame,
+        cache: args.cache.as_deref(),
+    };
     if let Some(asked) = asked.as_ref().filter(|a| a.is_dry()) {
-        return asked.count(&[args.opening.open(&args.recording)?], &config);
+        let recording = match args.recordings.as_slice() {
+            [dir] => args.opening.open(dir)?,
+            _ => given.open(&config, &Steps::new())?,
+        };
+        return asked.count(&[recording], &config);
     }
-    let given = Given { recording: &args.recording, opening: args.opening, door: args.door };
     let wishes = Wishes { steps: args.keep, textures: !args.no_textures };
     make(given, &args.out, &config, wishes, asked.as_ref())
 }
@@ -112,49 +133,6 @@ pub struct Wishes {
     pub textures: bool,
 }
 
-/// A joint's recorded hands, as `trajectories.json` has them.
-#[derive(Debug, serde::Serialize, serde::Deserialize)]
-pub struct JointHands {
-    /// The joint.
-    pub joint: String,
-    /// Clip name and trajectory.
-    pub clips: Vec<(String, Trajectory)>,
-}
-
-/// Hands of each joint of a scene, in the twin's order.
-pub fn joint_hands(scene: &Scene, twin: &Twin) -> Vec<JointHands> {
-    twin.furniture
-        .iter()
-        .map(|f| JointHands {
-            joint: f.part.id.clone(),
-            clips: scene
-                .joints
-                .iter()
-                .filter(|j| j.id == f.part.id)
-                .flat_map(|j| &j.clips)
-                .filter_map(|name| scene.clips.iter().find(|c| c.clip.clip == *name))
-                .filter_map(|c| c.trajectory.clone().map(|t| (c.clip.clip.clone(), t)))
-                .collect(),
-        })
-        .collect()
-}
-
-/// Borrowed in the form that validation takes.
-pub fn as_hands(joints: &[JointHands]) -> Vec<Hands<'_>> {
-    joints.iter().map(|j| j.clips.iter().map(|(name, t)| (name.clone(), t)).collect()).collect()
-}
-
-/// A recording that is still to be read.
-#[derive(Clone, Copy)]
-pub struct Given<'a> {
-    /// Its folder.
-    pub recording: &'a Path,
-    /// What may be read of it.
-    pub opening: Opening,
-    /// What is done where it contradicts itself.
-    pub door: Door,
-}
-
 pub fn make(
     given: Given,
     out: &Path,
@@ -163,26 +141,30 @@ pub fn make(
     asked: Option<&Asked>,
 ) -> anyhow::Result<Answer> {
     let begin = Instant::now();
-    if let Some(answers) = asked.and_then(Asked::answers)
-        && std::path::absolute(answers)?.starts_with(std::path::absolute(out)?)
+    for (kept, what, option) in
+        [(asked.and_then(Asked::answers), "answers", "--answers"), (given.cache, "looks", "--cache")]
     {
-        bail!(
-            "{}: answers kept there would go when {} is replaced; choose another --answers",
-            shown(answers),
-            shown(out)
-        );
+        if let Some(kept) = kept
+            && std::path::absolute(kept)?.starts_with(std::path::absolute(out)?)
+        {
+            let [kept, out] = [kept, out].map(shown);
+            bail!("{kept}: {what} kept there would go when {out} is replaced; choose another {option}");
+        }
     }
-    let output = Output::new(out, Kind::Twin, &[given.recording])?;
-    let recording = given.door.open(given.opening, given.recording)?;
+    let inputs: Vec<&Path> = given.recordings.iter().map(PathBuf::as_path).collect();
+    let output = Output::new(out, Kind::Twin, &inputs)?;
     let steps = Steps::new();
+    let recording = given.open(config, &steps)?;
+    let store = cache::open(given.cache, config)?;
+    let how = model::How { config, asked, store: &*store, keep: wishes.steps };
     let model::Inferred { mut scene, reasoner, usage, exchanges, lost: unread } =
-        model::infer(&recording, config, asked, &steps, wishes.steps)?;
+        model::infer(&recording, how, &steps)?;
     super::infer::weigh(&mut scene, &recording, config, &steps);
     steps.report("fitting boxes", 0, 1);
-    let twin = fitting::fit(&scene, &recording.up(), &config.fitting);
+    let twin = fitting::fit(&scene, &recording.up(), &config.fitting, &config.priors);
     steps.report("simulating", 0, 1);
-    let hands = joint_hands(&scene, &twin);
-    let (validation, mut lost) = replayed(&twin, &hands, &recording.up(), &config.validation)?;
+    let hands = make::joint_hands(&scene, &twin);
+    let (validation, mut lost) = make::replay(&twin, &hands, &recording.up(), &config.validation)?;
     let look = match wishes.textures {
         true => looked(&recording, &scene, &twin, config, &steps).unwrap_or_else(|error| {
             lost.push(format!("textures: {error}"));
@@ -198,21 +180,31 @@ pub fn make(
     output.write("twin.json", json::text(&twin)?)?;
     output.write("validation.json", json::text(&validation)?)?;
     let verdicts = validation.words();
-    let moves = primitives::of(&twin, &super::primitives::seen(&hands, &verdicts, &rows));
+    let moves = primitives::of(&twin, &super::primitives::seen(&hands, &verdicts, &rows), &config.primitives);
     output.write("primitives.json", json::text(&moves)?)?;
     for (furniture, check) in twin.furniture.iter().zip(&validation.joints) {
-        output.write(&format!("proof/{}.svg", file_name(&check.id)), pictures::proof(furniture, check))?;
+        output.write(&format!("proof/{}.svg", file_name(&check.id)), drawings::proof(furniture, check))?;
     }
     output.write("trajectories.json", json::text(&hands)?)?;
     output.write("config.toml", config.to_toml())?;
-    let command = format!("paws twin {} --out {}", shown(&recording.dir), shown(out));
-    let is_there = |note: &&FileNote| match note.name {
+    let folders: Vec<String> = given.recordings.iter().map(|dir| shown(dir)).collect();
+    let command = format!("paws twin {} --out {}", folders.join(" "), shown(out));
+    let is_there = |note: &FileNote| match note.name {
         "steps/" => wishes.steps,
         LOOK => look.is_some(),
         _ => true,
     };
-    let notes: Vec<FileNote> = FILES.iter().filter(is_there).cloned().collect();
-    output.write("index.html", page::render(&scene, &twin, &validation, &glb, &command, &notes)?)?;
+    let notes: Vec<FileNote> = file_notes().into_iter().filter(is_there).collect();
+    let pictured = match wishes.textures {
+        true => page_frames::frames(&recording, &scene, &twin, &config.comparison).unwrap_or_else(|error| {
+            lost.push(format!("recorded frames of the page: {error}"));
+            Vec::new()
+        }),
+        false => Vec::new(),
+    };
+    let origins = origin::read(&recording.dir);
+    let around = PageContext { command: &command, files: &notes, frames: &pictured, origins: &origins };
+    output.write("index.html", page::render(&scene, &twin, &validation, &glb, &around)?)?;
     if wishes.steps {
         lost.extend(keep::write(&recording, &scene, &twin, &exchanges, &output));
     }
@@ -241,12 +233,13 @@ pub fn make(
         shown(&out.join("scene.usda"))
     ))?;
     let refuted = validation.joints.iter().any(|j| j.verdict == Verdict::Fail);
-    let whole = lost.is_empty() && unread.is_empty() && twin.left_out.is_empty() && !damaged;
+    let all_joined = scene.videos.left_out.is_empty();
+    let read_whole = unread.is_empty() && recording.left_out == LeftOut::default();
+    let whole = lost.is_empty() && read_whole && twin.left_out.is_empty() && !damaged && all_joined;
     Ok(if refuted || twin.furniture.is_empty() || !whole { Answer::No } else { Answer::Yes })
 }
 
-/// What the twin looks like; `None` where there is nothing to see. An error costs the look, not the twin: everything else is
-/// written without it.
+/// What the twin looks like. An error costs the look, not the twin: everything else is written without it.
 fn looked(
     recording: &Recording,
     scene: &Scene,
@@ -255,64 +248,19 @@ fn looked(
     steps: &Steps,
 ) -> crate::error::Result<Option<Look>> {
     steps.report("textures", 0, 1);
-    worn(twin, crate::appearance::look(recording, scene, twin, &config.appearance)?)
-}
-
-/// A look that the exporters take, where there is anything in it.
-fn worn(twin: &Twin, look: Look) -> crate::error::Result<Option<Look>> {
-    Ok(export::dress::shows(twin, &look)?.then_some(look))
+    make::look(recording, scene, twin, &config.appearance)
 }
 
 /// Writes the twin in all formats; returns the file for viewers.
 fn models(output: &Output, twin: &Twin, look: Option<&Look>, validation: &Validation) -> anyhow::Result<Vec<u8>> {
-    let glb = export::gltf::write(twin, look, &validation.words())?;
-    output.write("scene.urdf", export::urdf::write(twin, look)?)?;
-    output.write("scene.xml", export::mjcf::write(twin, look)?)?;
-    output.write("kitchen.xml", export::mjcf::write_model(twin, look)?)?;
-    output.write("scene.glb", &glb)?;
-    output.write("physics.glb", export::gltf::write_physics(twin)?)?;
-    output.write("scene.usda", export::usd::write(twin, look)?)?;
-    output.write("scene.usdz", export::usd::write_package(twin, look)?)?;
-    for (name, bytes) in look.map_or_else(|| Ok(Vec::new()), |look| export::dress::files(twin, look))? {
-        output.write(&name, bytes)?;
+    let mut glb = Vec::new();
+    for (name, bytes) in make::files(twin, look, &validation.words())? {
+        output.write(&name, &bytes)?;
+        if name == "scene.glb" {
+            glb = bytes;
+        }
     }
     Ok(glb)
-}
-
-/// The replay of all joints, and what had to be left out of it: a hand that cannot be replayed costs its clip, a joint that
-/// cannot be simulated its hands.
-pub fn replayed(
-    twin: &Twin,
-    hands: &[JointHands],
-    up: &Vector,
-    config: &config::Validation,
-) -> crate::error::Result<(Validation, Vec<String>)> {
-    let mut kept = as_hands(hands);
-    if let Ok(validation) = validation::validate(twin, &kept, up, config) {
-        return Ok((validation, Vec::new()));
-    }
-    let alone = |joint: usize, clips: Hands| -> crate::error::Result<()> {
-        let mut all: Vec<Hands> = vec![Vec::new(); hands.len()];
-        if let Some(own) = all.get_mut(joint) {
-            *own = clips;
-        }
-        validation::validate(twin, &all, up, config).map(|_| ())
-    };
-    let mut lost = Vec::new();
-    for (i, (clips, joint)) in kept.iter_mut().zip(hands).enumerate() {
-        clips.retain(|(name, trajectory)| match alone(i, vec![(name.clone(), *trajectory)]) {
-            Ok(()) => true,
-            Err(error) => {
-                lost.push(format!("replay of clip {name}: {error}"));
-                false
-            }
-        });
-        if let Err(error) = alone(i, clips.clone()) {
-            lost.push(format!("replay of {}: {error}", joint.joint));
-            clips.clear();
-        }
-    }
-    Ok((validation::validate(twin, &kept, up, config)?, lost))
 }
 
 /// A joint's name as that of a file: joints of models from elsewhere may be called anything.
@@ -333,12 +281,12 @@ pub fn summary(scene: &Scene, twin: &Twin, validation: &Validation) -> String {
             f.part.id.clone(),
             f.part.label.clone(),
             kind.word().to_owned(),
-            words::axis(&f.part, joint.and_then(|j| j.face.as_ref())),
-            words::amount(kind, f.part.joint.upper),
+            phrases::axis(&f.part, joint.and_then(|j| j.face.as_ref())),
+            phrases::amount(kind, f.part.joint.upper),
             joint.map_or(0, |j| j.clips.len()).to_string(),
-            words::centimetres(check.rms_m),
+            phrases::centimetres(check.rms_m),
             format!("{:.0} N", check.peak_force_n),
-            words::margin(check.margin_nats),
+            phrases::margin(check.margin_nats),
             check.verdict.word().to_owned(),
         ]);
         if check.verdict != Verdict::Pass {
@@ -351,11 +299,14 @@ pub fn summary(scene: &Scene, twin: &Twin, validation: &Validation) -> String {
     } else {
         text += &aligned(&rows);
     }
+    if let Some(note) = phrases::assumed(scene) {
+        text += &format!("\n{note}\n");
+    }
     for left in &twin.left_out {
         reasons += &format!("{}: not built: {}\n", left.id, left.reason);
     }
     for joint in &scene.joints {
-        for why in words::refuted(joint) {
+        for why in phrases::refuted(joint) {
             reasons += &format!("{}: physics speaks against {why}\n", joint.id);
         }
     }

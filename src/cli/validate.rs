@@ -6,12 +6,12 @@ use clap::Args;
 
 use super::joints::{self, JointArgs};
 use super::output::write_file;
-use super::twin::{JointHands, as_hands};
 use super::{Answer, ConfigFile, foreign, print};
 use crate::json;
+use crate::make::{JointHands, as_hands};
 use crate::math::Vector;
+use crate::report::phrases;
 use crate::report::table::aligned;
-use crate::report::words;
 use crate::twin::Twin;
 use crate::validation::{self, Verdict};
 
@@ -71,17 +71,17 @@ pub fn run(args: &ValidateArgs) -> anyhow::Result<Answer> {
                 name.clone(),
                 c.clip.clone(),
                 format!("{:?}", c.action).to_lowercase(),
-                words::centimetres(replay.rms_m),
-                words::centimetres(replay.max_m),
-                c.held_out_rms_m.map_or("-".to_owned(), words::centimetres),
+                phrases::centimetres(replay.rms_m),
+                phrases::centimetres(replay.max_m),
+                c.held_out_rms_m.map_or("-".to_owned(), phrases::centimetres),
                 format!("{:.0} N", replay.peak_force_n),
-                words::amount(kind, replay.reached[1] - replay.reached[0]),
-                words::amount(kind, c.observed_range),
+                phrases::amount(kind, replay.reached[1] - replay.reached[0]),
+                phrases::amount(kind, c.observed_range),
                 replay.worst_penetration().map_or("-".to_owned(), |(m, with)| format!("{:.1} mm {with}", 1000.0 * m)),
-                c.rival.as_ref().map_or("-".to_owned(), |r| format!("{} {}", r.name, words::centimetres(r.rms_m))),
+                c.rival.as_ref().map_or("-".to_owned(), |r| format!("{} {}", r.name, phrases::centimetres(r.rms_m))),
             ]);
         }
-        let odds = check.margin_nats.map_or(String::new(), |nats| format!(" ({})", words::margin(Some(nats))));
+        let odds = check.margin_nats.map_or(String::new(), |nats| format!(" ({})", phrases::margin(Some(nats))));
         verdicts += &format!("{name}: {}{odds}: {}\n", check.verdict.word(), check.reason);
     }
     print(&aligned(&rows))?;

@@ -1,6 +1,5 @@
 //! `--vlm-url` and what goes with it: a language model's words about the pictures.
 
-use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -12,18 +11,18 @@ use clap::Args;
 use super::progress::Steps;
 use super::{Answer, print};
 use crate::config::Config;
-use crate::error::Error;
-use crate::geometry::segments::Lsd;
-use crate::pipeline::{self, Scene};
+use crate::make;
+use crate::pipeline::{self, LookStore, Scene};
 use crate::reasoning::Reasoner;
+use crate::reasoning::asking::Asking;
 use crate::reasoning::heuristic::Geometric;
+use crate::reasoning::naming::{self, Naming};
 use crate::reasoning::prompts::Prompts;
-use crate::reasoning::words::Asking;
 use crate::recording::Recording;
-use crate::vlm::absent::{DryRun, Replay};
-use crate::vlm::server::{self, Key, Limits, Server};
+use crate::vlm::absent::{DryRun, StoredOnly};
+use crate::vlm::server::{self, ApiKey, RequestLimits, Server};
 use crate::vlm::store::Stored;
-use crate::vlm::{Model, Question, Usage};
+use crate::vlm::{LanguageModel, PictureQuestion, Usage};
 
 const HEADING: &str = "Language model (optional)";
 /// Where a key is looked for when nobody says where.
@@ -58,10 +57,11 @@ pub struct WordsArgs {
     /// Folder where answers are kept and looked up [default: answers/ in the recording]
     #[arg(long, value_name = "DIR", requires = "vlm_model", help_heading = HEADING)]
     answers: Option<PathBuf>,
-    /// Use kept answers only, without any network
-    #[arg(long, requires = "vlm_model", help_heading = HEADING)]
+    /// Use only answers that an earlier run kept (--answers): asks nobody, needs no network. It has nothing to do with the
+    /// replay in physics
+    #[arg(long, visible_alias = "kept-answers", requires = "vlm_model", help_heading = HEADING)]
     replay: bool,
-    /// Folder with prompts of your own: motion_type.txt, summary.txt, axis_choice.txt
+    /// Folder with prompts of your own: motion_type.txt, summary.txt, axis_choice.txt, naming.txt
     #[arg(long, value_name = "DIR", requires = "vlm_model", help_heading = HEADING)]
     templates: Option<PathBuf>,
 }
@@ -76,7 +76,7 @@ enum Mode {
 
 /// Who is asked, and how.
 pub struct Asked {
-    base: Box<dyn Model>,
+    base: Box<dyn LanguageModel>,
     mode: Mode,
     prompts: Prompts,
     at_once: usize,
@@ -87,15 +87,15 @@ impl WordsArgs {
     /// `None` where no model is to be asked.
     pub fn open(&self) -> anyhow::Result<Option<Asked>> {
         let Some(model) = &self.vlm_model else { return Ok(None) };
-        let (mode, base): (Mode, Box<dyn Model>) = match &self.vlm_url {
+        let (mode, base): (Mode, Box<dyn LanguageModel>) = match &self.vlm_url {
             _ if self.dry_run => (Mode::DryRun, Box::new(DryRun::new(model))),
-            _ if self.replay => (Mode::Replay, Box::new(Replay::new(model))),
+            _ if self.replay => (Mode::Replay, Box::new(StoredOnly::new(model))),
             Some(url) => {
-                let limits = Limits {
+                let limits = RequestLimits {
                     request: Duration::from_secs(self.vlm_timeout),
                     at_once: self.vlm_concurrency as usize,
                     max_requests: self.max_requests,
-                    ..Limits::default()
+                    ..RequestLimits::default()
                 };
                 (Mode::Ask, Box::new(Server::new(url, model, self.key(url)?, limits)?))
             }
@@ -106,17 +106,17 @@ impl WordsArgs {
         Ok(Some(Asked { base, mode, prompts, at_once, answers: self.answers.clone() }))
     }
 
-    fn key(&self, url: &str) -> anyhow::Result<Option<Key>> {
+    fn key(&self, url: &str) -> anyhow::Result<Option<ApiKey>> {
         let Some(variable) = &self.vlm_key_env else {
             // Somebody's key for one service is nobody else's business, and no unencrypted line's.
             let safe = url.trim().to_ascii_lowercase().starts_with("https://") || server::is_loopback(url);
-            return Ok(if safe { Key::from_env(USUAL_KEY)? } else { None });
+            return Ok(if safe { ApiKey::from_env(USUAL_KEY)? } else { None });
         };
         // What was given is not repeated: it may be the key itself.
         if !variable.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
             bail!("--vlm-key-env takes the name of an environment variable, not a key");
         }
-        match Key::from_env(variable)? {
+        match ApiKey::from_env(variable)? {
             Some(key) => Ok(Some(key)),
             None => bail!("the environment variable that --vlm-key-env names is not set"),
         }
@@ -144,7 +144,8 @@ impl Asked {
         let mut total: Option<Usage> = None;
         for recording in recordings {
             let steps = Steps::new();
-            let usage = infer(recording, config, Some(self), &steps, false)?.usage;
+            let how = How { config, asked: Some(self), store: &pipeline::Forgetful, keep: false };
+            let usage = infer(recording, how, &steps)?.usage;
             steps.finish();
             total = added(total, usage);
         }
@@ -164,7 +165,7 @@ impl Asked {
     /// The model with its answers beside a recording.
     fn beside<'a>(&'a self, recording: &Recording, steps: &'a Steps, keep: bool) -> anyhow::Result<Watched<'a>> {
         let dir = self.answers.clone().unwrap_or_else(|| recording.dir.join("answers"));
-        let base: &'a dyn Model = &*self.base;
+        let base: &'a dyn LanguageModel = &*self.base;
         let stored = match self.mode {
             Mode::Ask => Stored::new(base, &dir)?,
             Mode::DryRun | Mode::Replay => Stored::reading(base, &dir),
@@ -176,7 +177,7 @@ impl Asked {
 /// A question with its answer.
 pub struct Exchange {
     /// What was asked.
-    pub question: Question,
+    pub question: PictureQuestion,
     /// What was said.
     pub answer: Option<String>,
 }
@@ -195,15 +196,15 @@ impl Exchange {
 
 /// A model under a progress bar, whose exchanges are kept where somebody wants to see them.
 struct Watched<'a> {
-    stored: Stored<&'a dyn Model>,
+    stored: Stored<&'a dyn LanguageModel>,
     steps: &'a Steps,
     count: AtomicUsize,
     keep: bool,
     exchanges: Mutex<Vec<Exchange>>,
 }
 
-impl Model for Watched<'_> {
-    fn ask(&self, question: &Question) -> crate::error::Result<Option<String>> {
+impl LanguageModel for Watched<'_> {
+    fn ask(&self, question: &PictureQuestion) -> crate::error::Result<Option<String>> {
         let answer = self.stored.ask(question)?;
         let count = self.count.fetch_add(1, Ordering::Relaxed) + 1;
         self.steps.note(format!("{count} questions"));
@@ -237,88 +238,66 @@ pub struct Inferred {
     pub lost: Vec<String>,
 }
 
-/// Frames go wrong one by one on a disk; more than this are an export gone wrong.
-const MOST_BAD_FILES: usize = 8;
-
-/// The pipeline, without the few files of frames that cannot be read.
+/// The joints, without the few files of frames that cannot be read, which are told.
 fn scene_of(
     recording: &Recording,
-    config: &Config,
+    how: How,
     reasoner: &dyn Reasoner,
     progress: pipeline::Progress,
 ) -> crate::error::Result<(Scene, Vec<String>)> {
-    let mut recording = Cow::Borrowed(recording);
-    let mut lost = Vec::new();
-    loop {
-        match pipeline::infer(&recording, config, &Lsd, reasoner, progress) {
-            Ok(scene) => {
-                lost.sort();
-                for why in &lost {
-                    eprintln!("left out: {why}");
-                }
-                return Ok((scene, lost));
-            }
-            Err(error) if lost.len() < MOST_BAD_FILES && has_file(&recording, &error) => {
-                forget_file(recording.to_mut(), &error);
-                lost.push(error.to_string());
-            }
-            Err(error) => return Err(error),
-        }
+    let (scene, lost) = make::scene(recording, how.config, reasoner, progress, how.store)?;
+    for why in &lost {
+        eprintln!("left out: {why}");
     }
+    Ok((scene, lost))
 }
 
-/// The file that an error is about.
-fn file_of(error: &Error) -> Option<&Path> {
-    match error {
-        Error::Format { path, .. } | Error::Io { path, .. } => Some(path),
-        _ => None,
-    }
-}
-
-/// Whether an error is about a file of one frame.
-fn has_file(recording: &Recording, error: &Error) -> bool {
-    let Some(path) = file_of(error) else { return false };
-    recording.frames.iter().any(|frame| {
-        let f = &frame.files;
-        [&f.rgb, &f.depth, &f.normals, &f.mask, &f.segments].into_iter().any(|file| file.as_deref() == Some(path))
-    })
-}
-
-/// Leaves the file that an error is about out of its frame.
-fn forget_file(recording: &mut Recording, error: &Error) {
-    let Some(path) = file_of(error) else { return };
-    for frame in &mut recording.frames {
-        let f = &mut frame.files;
-        for file in [&mut f.rgb, &mut f.depth, &mut f.normals, &mut f.mask, &mut f.segments] {
-            if file.as_deref() == Some(path) {
-                *file = None;
-            }
-        }
-    }
+/// How a recording is worked on.
+#[derive(Clone, Copy)]
+pub struct How<'a> {
+    /// The parameters.
+    pub config: &'a Config,
+    /// Who is asked, if anybody.
+    pub asked: Option<&'a Asked>,
+    /// What keeps what frames show.
+    pub store: &'a dyn LookStore,
+    /// Whether questions are kept with their answers.
+    pub keep: bool,
 }
 
 /// Runs the pipeline, with a model's words where one is to be asked.
-pub fn infer(
-    recording: &Recording,
-    config: &Config,
-    asked: Option<&Asked>,
-    steps: &Steps,
-    keep: bool,
-) -> anyhow::Result<Inferred> {
-    let geometric = Geometric { reasoning: config.reasoning.clone(), inference: config.inference.clone() };
+pub fn infer(recording: &Recording, how: How, steps: &Steps) -> anyhow::Result<Inferred> {
+    let How { config, asked, keep, .. } = how;
+    let geometric = Geometric::of(config);
     let report = |step: &str, done: usize, total: usize| steps.report(step, done, total);
     let Some(asked) = asked else {
-        let (scene, lost) = scene_of(recording, config, &geometric, &report)?;
+        let (scene, lost) = scene_of(recording, how, &geometric, &report)?;
         let reasoner = geometric.name().to_owned();
         return Ok(Inferred { scene, reasoner, usage: None, exchanges: Vec::new(), lost });
     };
     let model = asked.beside(recording, steps, keep)?;
+    let named = named(recording, config, asked, &model)?;
+    let recording = named.as_ref().unwrap_or(recording);
     let asking = Asking { geometric: &geometric, model: &model, prompts: &asked.prompts, at_once: asked.at_once };
-    let (scene, lost) = scene_of(recording, config, &asking, &report)?;
+    let (scene, lost) = scene_of(recording, how, &asking, &report)?;
     let reasoner = format!("{} ({})", asking.name(), asked.model());
     let usage = Some(model.usage());
     let exchanges = model.exchanges.into_inner().unwrap_or_else(PoisonError::into_inner);
     Ok(Inferred { scene, reasoner, usage, exchanges, lost })
+}
+
+/// The recording with a model's names for the clips that nobody named; `None` where there are none, or names are not to be used.
+fn named(
+    recording: &Recording,
+    config: &Config,
+    asked: &Asked,
+    model: &Watched,
+) -> crate::error::Result<Option<Recording>> {
+    if !config.reasoning.use_names || !recording.clips.iter().any(naming::is_unnamed) {
+        return Ok(None);
+    }
+    let naming = Naming { model, prompts: &asked.prompts, config: &config.reasoning, at_once: asked.at_once };
+    Ok(Some(Recording { clips: naming.clips(recording)?, ..recording.clone() }))
 }
 
 /// The usage after one more recording: the model counts over all of them, stored answers are counted by recording.

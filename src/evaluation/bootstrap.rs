@@ -17,7 +17,7 @@ const TAILS: [f64; 2] = [0.025, 0.975];
 /// What is drawn as one: the clips of one joint of one recording. They share furniture and, where clips are merged, the
 /// answer, so that two of them are not two independent observations.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Cluster {
+pub struct ClipCluster {
     /// Sum of the value over the clips.
     pub sum: f64,
     /// Clips, at least one.
@@ -45,7 +45,7 @@ impl Interval {
 ///
 /// Where all clips agree the interval has no width, although the truth is less sure than that.
 #[must_use]
-pub fn interval(clusters: &[Cluster]) -> Option<Interval> {
+pub fn interval(clusters: &[ClipCluster]) -> Option<Interval> {
     drawn(clusters.len(), |draw| {
         let (mut sum, mut clips) = (0.0, 0);
         for &i in draw {
@@ -79,8 +79,8 @@ pub(super) fn drawn(count: usize, statistic: impl Fn(&[usize]) -> Option<f64>) -
 mod tests {
     use super::*;
 
-    fn single(right: &[bool]) -> Vec<Cluster> {
-        right.iter().map(|&r| Cluster { sum: f64::from(u8::from(r)), clips: 1 }).collect()
+    fn single(right: &[bool]) -> Vec<ClipCluster> {
+        right.iter().map(|&r| ClipCluster { sum: f64::from(u8::from(r)), clips: 1 }).collect()
     }
 
     #[test]
@@ -109,10 +109,10 @@ mod tests {
     #[test]
     fn a_second_clip_of_a_joint_tells_nothing_new() {
         let right = [true, false, true, true, false, true, false, true];
-        let twice: Vec<Cluster> =
-            right.iter().map(|&r| Cluster { sum: 2.0 * f64::from(u8::from(r)), clips: 2 }).collect();
+        let twice: Vec<ClipCluster> =
+            right.iter().map(|&r| ClipCluster { sum: 2.0 * f64::from(u8::from(r)), clips: 2 }).collect();
         assert_eq!(interval(&twice), interval(&single(&right)));
-        let apart: Vec<Cluster> = single(&right).into_iter().flat_map(|c| [c, c]).collect();
+        let apart: Vec<ClipCluster> = single(&right).into_iter().flat_map(|c| [c, c]).collect();
         assert!(interval(&apart).unwrap().half_width() < interval(&twice).unwrap().half_width());
     }
 }

@@ -10,7 +10,7 @@ pub type Answered = (f64, bool);
 
 /// Answers whose confidences lie in one bin.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Bin {
+pub struct ConfidenceBin {
     /// Lower end, included.
     pub low: f64,
     /// Upper end, excluded except for 1.
@@ -25,7 +25,7 @@ pub struct Bin {
 
 /// Confidences against what was right.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Calibration {
+pub struct CalibrationReport {
     /// Answers with a confidence.
     pub answers: usize,
     /// Expected calibration error: mean gap between confidence and share right over the bins, weighed by their counts.
@@ -33,12 +33,12 @@ pub struct Calibration {
     /// Brier score: mean square of confidence minus right (1) or wrong (0).
     pub brier: f64,
     /// The bins that hold an answer, by rising confidence.
-    pub bins: Vec<Bin>,
+    pub bins: Vec<ConfidenceBin>,
 }
 
 /// Calibration of answers; `None` without any.
 #[must_use]
-pub fn calibration(answers: &[Answered]) -> Option<Calibration> {
+pub fn calibration(answers: &[Answered]) -> Option<CalibrationReport> {
     if answers.is_empty() {
         return None;
     }
@@ -51,7 +51,7 @@ pub fn calibration(answers: &[Answered]) -> Option<Calibration> {
             continue;
         }
         let count = inside.len() as f64;
-        bins.push(Bin {
+        bins.push(ConfidenceBin {
             low: i as f64 / BINS as f64,
             high: (i + 1) as f64 / BINS as f64,
             count: inside.len(),
@@ -61,7 +61,7 @@ pub fn calibration(answers: &[Answered]) -> Option<Calibration> {
     }
     let ece = bins.iter().map(|b| b.count as f64 * (b.mean_confidence - b.share_right).abs()).sum::<f64>() / total;
     let brier = answers.iter().map(|(c, right)| (c - hit(*right)).powi(2)).sum::<f64>() / total;
-    Some(Calibration { answers: answers.len(), ece, brier, bins })
+    Some(CalibrationReport { answers: answers.len(), ece, brier, bins })
 }
 
 fn bin_of(confidence: f64) -> usize {

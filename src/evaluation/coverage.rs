@@ -3,8 +3,8 @@
 
 use serde::Serialize;
 
-use super::rules::Measured;
-use super::summary::ClipReport;
+use super::clip_report::ClipReport;
+use super::rules::AnswerErrors;
 
 /// How often the truth lies as near to an answer as it says, of the answers whose type is right.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -26,7 +26,7 @@ const PLANE: [f64; 2] = [0.393_469, 0.864_665];
 const LINE: [f64; 2] = [0.682_689, 0.954_500];
 
 /// What is counted: its name, its size in standard deviations, and what is expected.
-type Counted = (&'static str, fn(&Measured) -> Option<f64>, [f64; 2]);
+type Counted = (&'static str, fn(&AnswerErrors) -> Option<f64>, [f64; 2]);
 
 /// Coverage of axis, hinge and range; what no answer speaks of is left out.
 #[must_use]
@@ -83,7 +83,7 @@ mod tests {
             orientation: None,
         };
         let clips = predictions.iter().map(|p| (p.clip.clone(), Some(clip.clone()))).collect();
-        Truth { recording: "r".to_owned(), tier: None, clips }
+        Truth { recording: "r".to_owned(), tier: None, place: None, clips }
     }
 
     /// The truth, with an error that is smaller across x than across y: 1 and 3 cm, 0.01 and 0.03 rad; 0.1 rad of range.

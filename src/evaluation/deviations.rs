@@ -5,8 +5,8 @@ use std::f64::consts::FRAC_PI_2;
 
 use serde::Serialize;
 
-use super::rules::{ErrorRule, Measured};
-use super::summary::ClipReport;
+use super::clip_report::ClipReport;
+use super::rules::{AnswerErrors, ErrorRule};
 use crate::articulation::JointKind;
 use crate::math::stats;
 
@@ -59,10 +59,11 @@ pub fn deviations(clips: &[ClipReport]) -> Vec<Deviations> {
 }
 
 fn of_kind(clips: &[ClipReport], kind: JointKind) -> Deviations {
-    let right: Vec<&Measured> =
+    let right: Vec<&AnswerErrors> =
         clips.iter().filter_map(|c| c.measured.as_ref()).filter(|m| m.type_right && m.kind == kind).collect();
-    let spread =
-        |value: fn(&Measured) -> Option<f64>| Spread::of(&right.iter().filter_map(|m| value(m)).collect::<Vec<f64>>());
+    let spread = |value: fn(&AnswerErrors) -> Option<f64>| {
+        Spread::of(&right.iter().filter_map(|m| value(m)).collect::<Vec<f64>>())
+    };
     let turns = kind == JointKind::Revolute;
     let outward = right.iter().filter(|m| m.signed_axis_rad < FRAC_PI_2).count();
     Deviations {
@@ -116,7 +117,7 @@ pub fn mean_errors(clips: &[ClipReport]) -> Vec<MeanErrors> {
         .collect()
 }
 
-/// Pairs of clips of one recording that show one joint, by the truth and by the predictions. Clips that move no joint are
+/// Pairs of clips of one place that show one joint, by the truth and by the predictions. Clips that move no joint are
 /// left out.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Pairs {
@@ -138,16 +139,20 @@ pub fn pairs(clips: &[ClipReport]) -> Option<Pairs> {
     if clips.iter().all(|c| c.predicted_joint.is_none()) {
         return None;
     }
-    let mut by_recording: BTreeMap<&str, Vec<&ClipReport>> = BTreeMap::new();
+    let mut by_place: BTreeMap<&str, Vec<&ClipReport>> = BTreeMap::new();
     for c in clips {
-        by_recording.entry(&c.recording).or_default().push(c);
+        by_place.entry(c.home()).or_default().push(c);
     }
+    // Joints of two recordings that were judged apart are two, whatever they are called.
+    let one_scene = |a: &ClipReport, b: &ClipReport| {
+        a.predicted_scene == b.predicted_scene && (a.predicted_scene.is_some() || a.recording == b.recording)
+    };
     let (mut true_pairs, mut predicted_pairs, mut both) = (0, 0, 0);
-    for clips in by_recording.values() {
+    for clips in by_place.values() {
         for (i, a) in clips.iter().enumerate() {
             for b in &clips[i + 1..] {
                 let truly = a.joint == b.joint;
-                let said = a.predicted_joint.is_some() && a.predicted_joint == b.predicted_joint;
+                let said = a.predicted_joint.is_some() && a.predicted_joint == b.predicted_joint && one_scene(a, b);
                 true_pairs += usize::from(truly);
                 predicted_pairs += usize::from(said);
                 both += usize::from(truly && said);

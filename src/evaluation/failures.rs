@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use serde::Serialize;
 
-use super::rules::{Measured, Rule, range_serves};
+use super::rules::{AnswerErrors, Rule, range_serves};
 use super::truth::{Prediction, Stage};
 use crate::articulation::JointKind;
 
@@ -69,7 +69,7 @@ impl Failure {
 
     /// Why a clip is not right, or that it is; a clip without a row has abstained.
     #[must_use]
-    pub fn of(prediction: Option<&Prediction>, measured: Option<&Measured>) -> Self {
+    pub fn of(prediction: Option<&Prediction>, measured: Option<&AnswerErrors>) -> Self {
         let Some(m) = measured else {
             return match prediction.and_then(|p| p.stage) {
                 Some(Stage::Hands) => Self::NoHand,

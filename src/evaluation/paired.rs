@@ -3,8 +3,9 @@
 use serde::Serialize;
 
 use super::bootstrap::interval;
+use super::clip_report::clusters;
 use super::rules::Rule;
-use super::summary::{Report, Shares, SharesInterval, clusters};
+use super::summary::{EvaluationReport, Shares, SharesInterval};
 
 /// The first predictions against the second under one rule.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -23,7 +24,7 @@ pub struct Paired {
 
 /// Compares two reports clip by clip; `None` where they are not about the same clips, or about none.
 #[must_use]
-pub fn compare(first: &Report, second: &Report) -> Option<Vec<Paired>> {
+pub fn compare(first: &EvaluationReport, second: &EvaluationReport) -> Option<Vec<Paired>> {
     let clips = &first.per_clip;
     let same = clips.len() == second.per_clip.len()
         && clips.iter().zip(&second.per_clip).all(|(a, b)| (&a.recording, &a.clip) == (&b.recording, &b.clip));

@@ -13,7 +13,7 @@ use crate::twin::OrientedBox;
 
 /// Distances and angles between one prediction and its truth.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Measured {
+pub struct AnswerErrors {
     /// The types agree.
     pub type_right: bool,
     /// True type.
@@ -67,7 +67,7 @@ pub struct Measured {
 
 /// Compares a prediction with the truth; `None` where there is no answer.
 #[must_use]
-pub fn measure(prediction: &Prediction, truth: &TrueClip) -> Option<Measured> {
+pub fn measure(prediction: &Prediction, truth: &TrueClip) -> Option<AnswerErrors> {
     let (kind, axis) = prediction.kind.zip(prediction.axis)?;
     let true_line = Line { point: truth.origin, direction: truth.axis };
     let origin = prediction.origin;
@@ -78,7 +78,7 @@ pub fn measure(prediction: &Prediction, truth: &TrueClip) -> Option<Measured> {
     let turns = type_right && kind == JointKind::Revolute;
     let said = prediction.uncertainty.as_ref().filter(|_| type_right);
     let boxes = prediction.part_box.as_ref().zip(truth.part_box.as_ref());
-    Some(Measured {
+    Some(AnswerErrors {
         type_right,
         kind: truth.kind,
         predicted_kind: kind,
@@ -245,7 +245,7 @@ impl Rule {
 
     /// `[M, MA, MAO]` of one answered clip.
     #[must_use]
-    pub fn judge(self, m: &Measured) -> [bool; 3] {
+    pub fn judge(self, m: &AnswerErrors) -> [bool; 3] {
         let slide = m.kind == JointKind::Prismatic;
         let (axis, origin) = match self {
             Self::Paws => (m.axis_rad <= 15f64.to_radians(), slide || within(m.point_to_point_m, 0.25)),
@@ -292,14 +292,14 @@ fn below(value: Option<f64>, limit: f64) -> bool {
 
 /// Whether the range is near enough for a simulation: within 10 degrees or 5 cm.
 #[must_use]
-pub fn range_serves(m: &Measured) -> bool {
+pub fn range_serves(m: &AnswerErrors) -> bool {
     let [turn, travel] = SIM_RANGE;
     within(m.range_error, if m.kind == JointKind::Prismatic { travel } else { turn })
 }
 
 /// USDNet's MO: type right, origin below 0.25 m from the true line whatever the axis; slides exempt.
 #[must_use]
-pub fn usdnet_mo(m: &Measured) -> bool {
+pub fn usdnet_mo(m: &AnswerErrors) -> bool {
     m.type_right && (m.kind == JointKind::Prismatic || below(m.origin_to_line_m, 0.25))
 }
 
@@ -333,8 +333,8 @@ impl ErrorRule {
 
     /// Axis error (radians, regardless of sign) and line error (metres) of one clip, `None` where the clip does not count.
     #[must_use]
-    pub fn errors(self, measured: Option<&Measured>) -> [Option<f64>; 2] {
-        let slide = |m: &Measured| m.kind == JointKind::Prismatic;
+    pub fn errors(self, measured: Option<&AnswerErrors>) -> [Option<f64>; 2] {
+        let slide = |m: &AnswerErrors| m.kind == JointKind::Prismatic;
         match (self, measured) {
             (Self::Dta, Some(m)) if m.type_right => {
                 [Some(m.axis_rad), if slide(m) { Some(0.0) } else { m.line_to_line_m }]
@@ -395,15 +395,15 @@ mod tests {
     }
 
     /// A hinge measured against the true one through (0, 0, 1).
-    fn hinge(axis: Vector, origin: Point) -> Measured {
+    fn hinge(axis: Vector, origin: Point) -> AnswerErrors {
         measure(&prediction(JointKind::Revolute, axis, origin), &truth(JointKind::Revolute)).unwrap()
     }
 
-    fn slide(axis: Vector, origin: Point) -> Measured {
+    fn slide(axis: Vector, origin: Point) -> AnswerErrors {
         measure(&prediction(JointKind::Prismatic, axis, origin), &truth(JointKind::Prismatic)).unwrap()
     }
 
-    fn mao(m: &Measured) -> Vec<Rule> {
+    fn mao(m: &AnswerErrors) -> Vec<Rule> {
         Rule::ALL.into_iter().filter(|r| r.judge(m)[2]).collect()
     }
 

@@ -3,7 +3,7 @@
 use super::truth::{Orientation, Prediction, TrueClip, Truth};
 use crate::articulation::JointKind;
 use crate::import::articulations::shape::PartBox;
-use crate::import::articulations::{Joint, Scene};
+use crate::import::articulations::{FoundJoint, JointScene};
 use crate::math::{Point, Vector};
 use crate::twin::OrientedBox;
 
@@ -24,7 +24,7 @@ pub struct Pairing {
 /// Pairs joints: by the points that parts have in common where both list their points, else the nearest ones, within a metre,
 /// by parts, handles or lines. Types and axes have no say.
 #[must_use]
-pub fn pair(predicted: &[Joint], truth: &[Joint]) -> Pairing {
+pub fn pair(predicted: &[FoundJoint], truth: &[FoundJoint]) -> Pairing {
     let mut all: Vec<(f64, usize, usize)> = Vec::new();
     for (t, joint) in truth.iter().enumerate() {
         for (p, other) in predicted.iter().enumerate() {
@@ -43,7 +43,7 @@ pub fn pair(predicted: &[Joint], truth: &[Joint]) -> Pairing {
 }
 
 /// How little two joints have to do with each other: below 1 where points are shared, else 1 and the distance, metres.
-fn cost(a: &Joint, b: &Joint) -> Option<f64> {
+fn cost(a: &FoundJoint, b: &FoundJoint) -> Option<f64> {
     if let (Some(of_a), Some(of_b)) = (&a.points, &b.points) {
         let both = common(of_a, of_b);
         return (both > 0).then(|| 1.0 - iou(both, of_a.len(), of_b.len()));
@@ -52,8 +52,8 @@ fn cost(a: &Joint, b: &Joint) -> Option<f64> {
     (apart <= MOST_APART_M).then_some(1.0 + apart)
 }
 
-fn apart(a: &Joint, b: &Joint) -> f64 {
-    let body = |j: &Joint| j.part.map(|part| part.center).or(j.handle);
+fn apart(a: &FoundJoint, b: &FoundJoint) -> f64 {
+    let body = |j: &FoundJoint| j.part.map(|part| part.center).or(j.handle);
     if let (Some(a), Some(b)) = (body(a), body(b)) {
         return (a - b).norm();
     }
@@ -61,7 +61,7 @@ fn apart(a: &Joint, b: &Joint) -> f64 {
     if a.kind == JointKind::Prismatic || b.kind == JointKind::Prismatic {
         return between;
     }
-    let line = |j: &Joint| j.articulation().line();
+    let line = |j: &FoundJoint| j.articulation().line();
     line(a).distance(&b.origin).max(line(b).distance(&a.origin)) + ALONG * between
 }
 
@@ -90,7 +90,7 @@ pub fn oriented(part: &PartBox) -> OrientedBox {
 }
 
 /// The axis that opens, by the range's longer side, and how far the joint opens, rad or m.
-fn opening(joint: &Joint) -> (Vector, Option<f64>) {
+fn opening(joint: &FoundJoint) -> (Vector, Option<f64>) {
     match joint.range {
         Some([low, high]) if -low > high => (-joint.axis, Some(high - low)),
         Some([low, high]) => (joint.axis, Some(high - low)),
@@ -100,7 +100,7 @@ fn opening(joint: &Joint) -> (Vector, Option<f64>) {
 
 /// A joint of the truth as the rules judge it.
 #[must_use]
-pub fn true_clip(joint: &Joint, up: &Vector) -> TrueClip {
+pub fn true_clip(joint: &FoundJoint, up: &Vector) -> TrueClip {
     let (axis, moved) = opening(joint);
     let turns = joint.kind == JointKind::Revolute;
     let on_hinge = |p: Point| if turns { joint.articulation().line().project(&p) } else { p };
@@ -122,7 +122,7 @@ pub fn true_clip(joint: &Joint, up: &Vector) -> TrueClip {
 
 /// A predicted joint as an answer about a joint of the truth.
 #[must_use]
-pub fn answer(joint: &Joint, truth: &Joint, recording: &str) -> Prediction {
+pub fn answer(joint: &FoundJoint, truth: &FoundJoint, recording: &str) -> Prediction {
     let (axis, range) = opening(joint);
     Prediction {
         recording: recording.to_owned(),
@@ -141,7 +141,7 @@ pub fn answer(joint: &Joint, truth: &Joint, recording: &str) -> Prediction {
 
 /// A scene of the truth with the answers about it: one "clip" a joint.
 #[must_use]
-pub fn rows(predicted: &Scene, truth: &Scene) -> (Vec<Prediction>, Truth, Pairing) {
+pub fn rows(predicted: &JointScene, truth: &JointScene) -> (Vec<Prediction>, Truth, Pairing) {
     let pairing = pair(&predicted.joints, &truth.joints);
     let answers = truth.joints.iter().zip(&pairing.predicted).filter_map(|(joint, p)| {
         let found = predicted.joints.get((*p)?)?;
@@ -149,7 +149,7 @@ pub fn rows(predicted: &Scene, truth: &Scene) -> (Vec<Prediction>, Truth, Pairin
     });
     let answers: Vec<Prediction> = answers.collect();
     let clips = truth.joints.iter().map(|j| (j.id.clone(), Some(true_clip(j, &truth.up)))).collect();
-    (answers, Truth { recording: truth.name.clone(), tier: None, clips }, pairing)
+    (answers, Truth { recording: truth.name.clone(), tier: None, place: None, clips }, pairing)
 }
 
 #[cfg(test)]
@@ -157,8 +157,8 @@ pub(super) mod tests {
     use super::*;
 
     /// An upright hinge through `(x, 0, 1)`, or a slide along z there.
-    pub(in crate::evaluation) fn joint(id: &str, kind: JointKind, x: f64, points: Option<Vec<usize>>) -> Joint {
-        Joint {
+    pub(in crate::evaluation) fn joint(id: &str, kind: JointKind, x: f64, points: Option<Vec<usize>>) -> FoundJoint {
+        FoundJoint {
             id: id.to_owned(),
             label: id.to_owned(),
             kind,
@@ -173,8 +173,8 @@ pub(super) mod tests {
         }
     }
 
-    pub(in crate::evaluation) fn scene(name: &str, joints: Vec<Joint>) -> Scene {
-        Scene {
+    pub(in crate::evaluation) fn scene(name: &str, joints: Vec<FoundJoint>) -> JointScene {
+        JointScene {
             name: name.to_owned(),
             format: "paws",
             up: Vector::z(),

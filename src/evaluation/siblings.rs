@@ -9,7 +9,7 @@ use crate::twin::{OrientedBox, Part, Role};
 /// Where a hinge's pivot is off to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Way {
+pub enum PivotShift {
     /// Along the face, to the hand.
     Toward,
     /// Along the face, from the hand.
@@ -31,7 +31,7 @@ pub enum Lean {
 /// What is wrong about a joint, from the grossest to the smallest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Fault {
+pub enum JointFault {
     /// A slide instead of a hinge, a hinge instead of a slide.
     Type,
     /// Hinged on the opposite side.
@@ -41,7 +41,7 @@ pub enum Fault {
     /// Opens the other way.
     Inward,
     /// The pivot is off by so many centimetres.
-    Shift(u32, Way),
+    Shift(u32, PivotShift),
     /// The axis leans by so many degrees.
     Tilt(u32, Lean),
 }
@@ -51,7 +51,7 @@ pub const SHIFTS_CM: [u32; 3] = [5, 10, 25];
 /// Sizes of the tilts, degrees.
 pub const TILTS_DEG: [u32; 3] = [5, 10, 20];
 
-impl Fault {
+impl JointFault {
     /// In words.
     #[must_use]
     pub fn name(self) -> String {
@@ -60,9 +60,9 @@ impl Fault {
             Self::Side => "hinged on the other side".to_owned(),
             Self::Edge => "axis turned by 90 deg".to_owned(),
             Self::Inward => "opens the other way".to_owned(),
-            Self::Shift(cm, Way::Toward) => format!("pivot {cm} cm nearer to the hand"),
-            Self::Shift(cm, Way::Away) => format!("pivot {cm} cm farther from the hand"),
-            Self::Shift(cm, Way::Into) => format!("pivot {cm} cm into the furniture"),
+            Self::Shift(cm, PivotShift::Toward) => format!("pivot {cm} cm nearer to the hand"),
+            Self::Shift(cm, PivotShift::Away) => format!("pivot {cm} cm farther from the hand"),
+            Self::Shift(cm, PivotShift::Into) => format!("pivot {cm} cm into the furniture"),
             Self::Tilt(deg, Lean::Within) => format!("axis tilted by {deg} deg in the face"),
             Self::Tilt(deg, Lean::Out) => format!("axis tilted by {deg} deg out of the face"),
         }
@@ -73,13 +73,13 @@ impl Fault {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Sibling {
     /// What is wrong about it.
-    pub fault: Fault,
+    pub fault: JointFault,
     /// The joint.
     pub articulation: Articulation,
 }
 
 /// A part's front: its directions, its middle and its half sizes.
-struct Front {
+struct PartFront {
     right: Vector,
     up: Vector,
     out: Vector,
@@ -88,7 +88,7 @@ struct Front {
     grip: Point,
 }
 
-impl Front {
+impl PartFront {
     fn of(part: &Part) -> Self {
         let bounds: OrientedBox = part.bounds;
         let [right, up, out] = [0, 1, 2].map(|i| bounds.rotation.column(i).into_owned());
@@ -120,19 +120,19 @@ impl Front {
     }
 }
 
-/// The wrong siblings of a part's joint, which is taken to be right, in the order of [`Fault`].
+/// The wrong siblings of a part's joint, which is taken to be right, in the order of [`JointFault`].
 ///
-/// Hinges have all of them, slides no shifts and no other side. All open outward but for [`Fault::Inward`], a hinge moved
+/// Hinges have all of them, slides no shifts and no other side. All open outward but for [`JointFault::Inward`], a hinge moved
 /// beyond the hand among them: its sense is the one in which the hand goes out.
 #[must_use]
 pub fn siblings(part: &Part) -> Vec<Sibling> {
     let own = part.joint.articulation;
-    let front = Front::of(part);
+    let front = PartFront::of(part);
     let mut all = match own.kind {
         JointKind::Revolute => of_hinge(&own, &front),
         JointKind::Prismatic => of_slide(&own, &front),
     };
-    all.push((Fault::Inward, own.reversed()));
+    all.push((JointFault::Inward, own.reversed()));
     for deg in TILTS_DEG {
         for (lean, about) in leans(&own, &front) {
             let axis = rotation(&about, f64::from(deg).to_radians()) * own.axis;
@@ -141,41 +141,43 @@ pub fn siblings(part: &Part) -> Vec<Sibling> {
                 JointKind::Revolute => own.line().project(&part.bounds.center),
                 JointKind::Prismatic => own.origin,
             };
-            all.push((Fault::Tilt(deg, lean), Articulation { axis, origin, ..own }));
+            all.push((JointFault::Tilt(deg, lean), Articulation { axis, origin, ..own }));
         }
     }
     all.sort_by_key(|(fault, _)| *fault);
     all.into_iter().map(|(fault, articulation)| Sibling { fault, articulation }).collect()
 }
 
-fn of_hinge(own: &Articulation, front: &Front) -> Vec<(Fault, Articulation)> {
+fn of_hinge(own: &Articulation, front: &PartFront) -> Vec<(JointFault, Articulation)> {
     let upright = own.axis.dot(&front.up).abs() >= own.axis.dot(&front.right).abs();
     // From the hinge to the middle, in the face.
     let across = reject(&reject(&(front.middle - own.origin), &own.axis), &front.out);
     let mut all = vec![
-        (Fault::Type, front.slide(front.out)),
-        (Fault::Side, front.hinge(own.axis, own.origin + across * 2.0)),
-        (Fault::Edge, front.edge(!upright)),
+        (JointFault::Type, front.slide(front.out)),
+        (JointFault::Side, front.hinge(own.axis, own.origin + across * 2.0)),
+        (JointFault::Edge, front.edge(!upright)),
     ];
     let Some(toward) = unit(&across) else { return all };
     let opening = unit(&own.axis.cross(&toward)).unwrap_or(front.out);
     for cm in SHIFTS_CM {
-        for (way, direction) in [(Way::Toward, toward), (Way::Away, -toward), (Way::Into, -opening)] {
+        for (way, direction) in
+            [(PivotShift::Toward, toward), (PivotShift::Away, -toward), (PivotShift::Into, -opening)]
+        {
             let origin = own.origin + direction * (0.01 * f64::from(cm));
-            all.push((Fault::Shift(cm, way), front.hinge(own.axis, origin)));
+            all.push((JointFault::Shift(cm, way), front.hinge(own.axis, origin)));
         }
     }
     all
 }
 
-fn of_slide(own: &Articulation, front: &Front) -> Vec<(Fault, Articulation)> {
+fn of_slide(own: &Articulation, front: &PartFront) -> Vec<(JointFault, Articulation)> {
     let comes_out = own.axis.dot(&front.out).abs() > 0.5;
     let square = if comes_out { front.right } else { front.out };
-    vec![(Fault::Type, front.edge(true)), (Fault::Edge, front.slide(square))]
+    vec![(JointFault::Type, front.edge(true)), (JointFault::Edge, front.slide(square))]
 }
 
 /// The directions about which an axis leans: two that are square to it.
-fn leans(own: &Articulation, front: &Front) -> [(Lean, Vector); 2] {
+fn leans(own: &Articulation, front: &PartFront) -> [(Lean, Vector); 2] {
     if own.axis.dot(&front.out).abs() > 0.5 {
         return [(Lean::Within, front.up), (Lean::Out, front.right)];
     }
@@ -224,7 +226,7 @@ mod tests {
         part(Articulation { kind: JointKind::Revolute, axis: -Vector::z(), origin: Point::new(0.0, 0.0, 0.35) })
     }
 
-    fn by_fault(part: &Part) -> BTreeMap<Fault, Articulation> {
+    fn by_fault(part: &Part) -> BTreeMap<JointFault, Articulation> {
         siblings(part).into_iter().map(|s| (s.fault, s.articulation)).collect()
     }
 
@@ -234,19 +236,19 @@ mod tests {
         let all = by_fault(&door);
         assert_eq!(all.len(), siblings(&door).len());
         assert_eq!(all.len(), 4 + 9 + 6);
-        let at = |fault: Fault| all[&fault];
-        assert_eq!((at(Fault::Type).kind, at(Fault::Type).axis), (JointKind::Prismatic, -Vector::y()));
-        let other = at(Fault::Side);
+        let at = |fault: JointFault| all[&fault];
+        assert_eq!((at(JointFault::Type).kind, at(JointFault::Type).axis), (JointKind::Prismatic, -Vector::y()));
+        let other = at(JointFault::Side);
         assert!((other.origin - Point::new(0.5, 0.0, 0.35)).norm() < 1e-9 && other.axis.z > 0.99, "{other:?}");
         // The hand is above the middle: the edge farther from it is the lower one.
-        let edge = at(Fault::Edge);
+        let edge = at(JointFault::Edge);
         assert!(edge.axis.x.abs() > 0.99 && edge.origin.z.abs() < 1e-9, "{edge:?}");
-        assert!((at(Fault::Shift(10, Way::Toward)).origin.x - 0.1).abs() < 1e-9);
-        assert!((at(Fault::Shift(25, Way::Away)).origin.x + 0.25).abs() < 1e-9);
-        assert!((at(Fault::Shift(5, Way::Into)).origin.y - 0.05).abs() < 1e-9);
+        assert!((at(JointFault::Shift(10, PivotShift::Toward)).origin.x - 0.1).abs() < 1e-9);
+        assert!((at(JointFault::Shift(25, PivotShift::Away)).origin.x + 0.25).abs() < 1e-9);
+        assert!((at(JointFault::Shift(5, PivotShift::Into)).origin.y - 0.05).abs() < 1e-9);
         for (fault, joint) in &all {
             let outward = (joint.motion(0.01) * door.handle - door.handle).dot(&-Vector::y());
-            assert_eq!(outward > 0.0, *fault != Fault::Inward, "{}: {outward}", fault.name());
+            assert_eq!(outward > 0.0, *fault != JointFault::Inward, "{}: {outward}", fault.name());
         }
     }
 
@@ -256,12 +258,12 @@ mod tests {
         let all = by_fault(&drawer);
         assert_eq!(all.len(), 3 + 6);
         // Held at the right, it would be hinged on the left.
-        let hinge = all[&Fault::Type];
+        let hinge = all[&JointFault::Type];
         assert!(hinge.kind == JointKind::Revolute && hinge.origin.x.abs() < 1e-9, "{hinge:?}");
-        assert!(all[&Fault::Edge].axis.dot(&Vector::y()).abs() < 1e-9);
-        assert_eq!(all[&Fault::Inward].axis, Vector::y());
-        assert!(all[&Fault::Tilt(20, Lean::Within)].axis.z.abs() < 1e-9);
-        assert!(all[&Fault::Tilt(20, Lean::Out)].axis.x.abs() < 1e-9);
+        assert!(all[&JointFault::Edge].axis.dot(&Vector::y()).abs() < 1e-9);
+        assert_eq!(all[&JointFault::Inward].axis, Vector::y());
+        assert!(all[&JointFault::Tilt(20, Lean::Within)].axis.z.abs() < 1e-9);
+        assert!(all[&JointFault::Tilt(20, Lean::Out)].axis.x.abs() < 1e-9);
     }
 
     #[test]
@@ -270,7 +272,7 @@ mod tests {
         for part in [door(), part(slide)] {
             let own = part.joint.articulation;
             for (fault, joint) in by_fault(&part) {
-                let Fault::Tilt(deg, _) = fault else { continue };
+                let JointFault::Tilt(deg, _) = fault else { continue };
                 assert!((unsigned_angle(&joint.axis, &own.axis).to_degrees() - f64::from(deg)).abs() < 1e-6);
                 assert!(
                     joint.line().distance(&own.line().project(&part.bounds.center)) < 1e-9 || own.kind == slide.kind

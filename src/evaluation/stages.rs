@@ -1,9 +1,11 @@
-//! The steps before the joint inference, measured against a truth: lines, room frame, region, depth scale.
+//! The steps around the joint inference, measured: lines, room frame, region and depth scale against a truth, the boxes of the
+//! room against depth.
 
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::room_fit::RoomFit;
 use crate::articulation::JointKind;
 use crate::error::{Error, Result};
 use crate::geometry::segments::{LineDetector, Segment2};
@@ -24,14 +26,14 @@ const HANDLE_M: f64 = 0.035;
 /// What the steps are measured against.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneTruth {
-    joints: Vec<Joint>,
-    clips: Vec<ClipTruth>,
+    joints: Vec<StageJoint>,
+    clips: Vec<StageClip>,
     depth_scale: Option<Vec<f64>>,
     depth_scale_recording: Option<f64>,
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-struct Joint {
+struct StageJoint {
     id: String,
     #[serde(rename = "type")]
     kind: JointKind,
@@ -44,15 +46,15 @@ struct Joint {
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-struct ClipTruth {
+struct StageClip {
     clip: String,
     joint: String,
 }
 
 #[derive(Deserialize)]
-struct File {
-    joints: Vec<Joint>,
-    clips: Vec<ClipTruth>,
+struct StagesFile {
+    joints: Vec<StageJoint>,
+    clips: Vec<StageClip>,
     #[serde(default)]
     depth_scale: Option<Vec<f64>>,
     #[serde(default)]
@@ -89,23 +91,25 @@ pub struct Stages {
     pub segments: usize,
     /// Left error of the corrected depth scale (0 = exact), one a frame, or one a recording where the truth has only that.
     pub depth_scale_error: Vec<f64>,
+    /// The twin's boxes against the recording's depth; empty where no twin was measured.
+    pub room: RoomFit,
 }
 
 impl SceneTruth {
     /// Reads a recording's `ground_truth.json`.
     pub fn read(recording: &Path) -> Result<Self> {
         let path = recording.join("ground_truth.json");
-        let file: File = json::read(&path)?;
+        let file: StagesFile = json::read(&path)?;
         for joint in &file.joints {
             if unit(&joint.axis).is_none() {
                 return Err(Error::format(&path, format!("joint {}", joint.id), "the axis is zero or not finite"));
             }
         }
-        let File { joints, clips, depth_scale, depth_scale_recording } = file;
+        let StagesFile { joints, clips, depth_scale, depth_scale_recording } = file;
         Ok(Self { joints, clips, depth_scale, depth_scale_recording })
     }
 
-    fn of_clip(&self, clip: &str) -> Option<&Joint> {
+    fn of_clip(&self, clip: &str) -> Option<&StageJoint> {
         let id = &self.clips.iter().find(|c| c.clip == clip)?.joint;
         self.joints.iter().find(|j| j.id == *id)
     }
@@ -118,16 +122,16 @@ impl SceneTruth {
 
     /// The room's axes: those that most joints' boxes share.
     fn axes(&self) -> Option<[Vector; 3]> {
-        let axes_of = |j: &Joint| [0, 1, 2].map(|i| j.part_box.rotation.column(i).into_owned());
+        let axes_of = |j: &StageJoint| [0, 1, 2].map(|i| j.part_box.rotation.column(i).into_owned());
         let off = |a: &[Vector; 3], b: &[Vector; 3]| {
             a.iter().map(|x| b.iter().map(|y| unsigned_angle(x, y)).fold(f64::INFINITY, f64::min)).fold(0.0, f64::max)
         };
-        let sharing = |j: &Joint| self.joints.iter().filter(|k| off(&axes_of(j), &axes_of(k)) < NEAR_RAD).count();
+        let sharing = |j: &StageJoint| self.joints.iter().filter(|k| off(&axes_of(j), &axes_of(k)) < NEAR_RAD).count();
         self.joints.iter().max_by_key(|j| sharing(j)).map(axes_of)
     }
 }
 
-impl Joint {
+impl StageJoint {
     fn line(&self) -> Line {
         Line { point: self.origin, direction: self.axis.normalize() }
     }
@@ -241,7 +245,6 @@ pub fn measure_segments(
     const FRAMES: usize = 20;
     const STEP_M: f64 = 0.02;
     const LEAST_PX: f64 = 20.0;
-    let camera = &recording.camera;
     let edges = truth.edges();
     for frame in views::survey(recording, &AtWork::of(recording), FRAMES) {
         let segments: Vec<Segment2> = match (recording.segments(frame)?, recording.grey(frame)?) {
@@ -251,6 +254,7 @@ pub fn measure_segments(
         };
         let segments: Vec<Segment2> = segments.into_iter().filter(|s| s.length() >= LEAST_PX).collect();
         let Some(depth) = recording.depth_as_read(frame)? else { continue };
+        let camera = recording.camera_of(frame);
         let scale = match (&truth.depth_scale, truth.depth_scale_recording) {
             (Some(scales), _) => scales.get(frame).copied().unwrap_or(1.0),
             (None, scale) => scale.unwrap_or(1.0),
@@ -322,6 +326,7 @@ impl Stages {
             out.edge_points = [0, 1].map(|i| out.edge_points[i] + s.edge_points[i]);
             out.segments += s.segments;
         }
+        out.room = RoomFit::pooled(all.iter().map(|s| &s.room));
         out
     }
 

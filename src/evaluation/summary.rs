@@ -4,14 +4,15 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::bootstrap::{Cluster, Interval, interval};
-use super::calibration::{Answered, Calibration, calibration, precision_at};
+use super::bootstrap::{Interval, interval};
+use super::calibration::{Answered, CalibrationReport, calibration, precision_at};
+use super::clip_report::{ClipReport, clusters};
 use super::coverage::{Coverage, coverage};
 use super::deviations::{Deviations, MeanErrors, Pairs, deviations, mean_errors, pairs};
 use super::failures::{Failure, FailureCount};
-use super::rules::{Measured, Rule, measure, usdnet_mo};
-use super::truth::{Orientation, Prediction, Predictions, TrueClip, Truth};
-use crate::articulation::{Action, JointKind};
+use super::rules::{Rule, usdnet_mo};
+use super::truth::{Prediction, Predictions, Truth};
+use crate::articulation::Action;
 use crate::math::stats;
 
 /// Shares under one rule.
@@ -63,7 +64,7 @@ pub struct RuleReport {
 
 /// Shares of a group of clips.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Group {
+pub struct ClipGroup {
     /// What the clips are grouped by: "type", "hinge", "action", "tier" or "noun".
     pub by: &'static str,
     /// Which group.
@@ -89,9 +90,9 @@ pub struct RuleShares {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Confidences {
     /// Confidence in the type.
-    pub kind: Option<Calibration>,
+    pub kind: Option<CalibrationReport>,
     /// Confidence in the joint.
-    pub joint: Option<Calibration>,
+    pub joint: Option<CalibrationReport>,
     /// Share right among the surest answers, by joint confidence.
     pub precision: Vec<Precision>,
 }
@@ -107,70 +108,9 @@ pub struct Precision {
     pub right: Option<f64>,
 }
 
-/// One clip's line in the report.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ClipReport {
-    /// Recording.
-    pub recording: String,
-    /// Clip.
-    pub clip: String,
-    /// True joint.
-    pub joint: String,
-    /// True type.
-    pub kind: JointKind,
-    /// How a true hinge lies.
-    pub orientation: Option<Orientation>,
-    /// Opening or closing.
-    pub action: Option<Action>,
-    /// How noisy the recording is.
-    pub tier: Option<String>,
-    /// What people call the furniture.
-    pub noun: Option<String>,
-    /// Joint of the scene that the prediction puts the clip on.
-    pub predicted_joint: Option<String>,
-    /// Confidence in the type.
-    pub confidence: Option<f64>,
-    /// Confidence in the joint.
-    pub joint_confidence: Option<f64>,
-    /// Distances and angles; null where there was no answer.
-    pub measured: Option<Measured>,
-    /// What became of it.
-    pub failure: Failure,
-    /// Why there was no answer.
-    pub reason: Option<String>,
-}
-
-impl ClipReport {
-    fn new(truth: &Truth, name: &str, clip: &TrueClip, prediction: Option<&Prediction>) -> Self {
-        let measured = prediction.and_then(|p| measure(p, clip));
-        Self {
-            recording: truth.recording.clone(),
-            clip: name.to_owned(),
-            joint: clip.joint.clone(),
-            kind: clip.kind,
-            orientation: clip.orientation,
-            action: clip.action,
-            tier: truth.tier.clone(),
-            noun: clip.noun.clone(),
-            predicted_joint: prediction.and_then(|p| p.joint.clone()),
-            confidence: prediction.and_then(|p| p.confidence),
-            joint_confidence: prediction.and_then(|p| p.joint_confidence),
-            failure: Failure::of(prediction, measured.as_ref()),
-            measured,
-            reason: prediction.and_then(|p| p.reason.clone()),
-        }
-    }
-
-    /// `[M, MA, MAO]` under a rule; no answer is wrong.
-    #[must_use]
-    pub fn judge(&self, rule: Rule) -> [bool; 3] {
-        self.measured.as_ref().map_or([false; 3], |m| rule.judge(m))
-    }
-}
-
 /// The whole evaluation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Report {
+pub struct EvaluationReport {
     /// Clips that move a joint.
     pub clips: usize,
     /// Of them, answered.
@@ -194,7 +134,7 @@ pub struct Report {
     /// Errors of the answers whose type is right, hinges first.
     pub deviations: Vec<Deviations>,
     /// Shares of groups of clips.
-    pub groups: Vec<Group>,
+    pub groups: Vec<ClipGroup>,
     /// What the confidences are worth.
     pub confidences: Confidences,
     /// What the covariances are worth; one entry for each kind of error that some prediction speaks of.
@@ -209,9 +149,10 @@ pub struct Report {
 
 /// Compares predictions with the truths of their recordings.
 #[must_use]
-pub fn evaluate(predictions: &Predictions, truths: &[Truth]) -> Report {
+pub fn evaluate(predictions: &Predictions, truths: &[Truth]) -> EvaluationReport {
+    let own: Vec<Prediction> = predictions.predictions.iter().map(Prediction::in_own_world).collect();
     let by_name: BTreeMap<(&str, &str), &Prediction> =
-        predictions.predictions.iter().map(|p| ((p.recording.as_str(), p.clip.as_str()), p)).collect();
+        own.iter().map(|p| ((p.recording.as_str(), p.clip.as_str()), p)).collect();
     let mut per_clip = Vec::new();
     let (mut distractors, mut false_positives) = (0, 0);
     for truth in truths {
@@ -237,7 +178,7 @@ pub fn evaluate(predictions: &Predictions, truths: &[Truth]) -> Report {
     let match_of = |g: &[&ClipReport]| g.iter().filter(|c| c.measured.is_some()).count() as f64 / g.len().max(1) as f64;
     let match_macro = recordings.iter().map(|g| match_of(g)).sum::<f64>() / recordings.len().max(1) as f64;
     let moved_right = per_clip.iter().filter(|c| c.measured.as_ref().is_some_and(usdnet_mo)).count();
-    Report {
+    EvaluationReport {
         clips: per_clip.len(),
         answered,
         match_share: answered as f64 / per_clip.len().max(1) as f64,
@@ -276,18 +217,6 @@ fn rule_report(rule: Rule, clips: &[ClipReport], recordings: &[Vec<&ClipReport>]
     }
 }
 
-/// Values of clips (by index) summed over the clips of each joint of each recording.
-pub(super) fn clusters(clips: &[ClipReport], value: impl Fn(usize) -> f64) -> Vec<Cluster> {
-    let mut of_joints: BTreeMap<(&str, &str), Cluster> = BTreeMap::new();
-    for (i, c) in clips.iter().enumerate() {
-        let cluster =
-            of_joints.entry((c.recording.as_str(), c.joint.as_str())).or_insert(Cluster { sum: 0.0, clips: 0 });
-        cluster.sum += value(i);
-        cluster.clips += 1;
-    }
-    of_joints.into_values().collect()
-}
-
 fn shares(clips: &[&ClipReport], rule: Rule, conditional: bool) -> Option<Shares> {
     let judged: Vec<[bool; 3]> =
         clips.iter().filter(|c| !conditional || c.measured.is_some()).map(|c| c.judge(rule)).collect();
@@ -301,7 +230,7 @@ fn mean(all: &[Shares]) -> Option<Shares> {
     (!all.is_empty()).then(|| Shares { m: sum(|s| s.m), ma: sum(|s| s.ma), mao: sum(|s| s.mao) })
 }
 
-fn groups(clips: &[ClipReport]) -> Vec<Group> {
+fn groups(clips: &[ClipReport]) -> Vec<ClipGroup> {
     type Name = fn(&ClipReport) -> Option<String>;
     let action = |c: &ClipReport| c.action.map(|a| if a == Action::Open { "open" } else { "close" }.to_owned());
     let names: [(&'static str, Name); 5] = [
@@ -320,7 +249,7 @@ fn groups(clips: &[ClipReport]) -> Vec<Group> {
             }
         }
         out.extend(members.into_iter().map(|(name, members)| {
-            Group {
+            ClipGroup {
                 by,
                 name,
                 clips: members.len(),
@@ -370,8 +299,9 @@ fn failures(clips: &[ClipReport]) -> Vec<FailureCount> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::articulation::JointKind;
     use crate::evaluation::compare;
-    use crate::evaluation::truth::Stage;
+    use crate::evaluation::truth::{InScene, Orientation, Stage, TrueClip};
     use crate::math::{Point, Vector};
     use crate::twin::OrientedBox;
 
@@ -406,6 +336,7 @@ mod tests {
         Truth {
             recording: "r".to_owned(),
             tier: Some("hard".to_owned()),
+            place: None,
             clips: clips.into_iter().map(|(name, clip)| (name.to_owned(), clip)).collect(),
         }
     }
@@ -462,6 +393,25 @@ mod tests {
         // Predicted: a0 a1, a0 b0, a1 b0; true: a0 a1, b0 b1.
         assert_eq!((pairs.predicted_pairs, pairs.true_pairs, pairs.both), (3, 2, 1));
         assert_eq!((pairs.precision, pairs.recall), (Some(1.0 / 3.0), Some(0.5)));
+    }
+
+    #[test]
+    fn pairs_of_two_recordings_count_where_they_are_of_one_place_and_in_one_scene() {
+        let truths =
+            ["r", "s"].map(|name| Truth { recording: name.to_owned(), place: Some("k".to_owned()), ..truth() });
+        let rows = |in_scene: Option<&InScene>| {
+            let of = |recording: &str| {
+                let row = row("a0", 0.0, "0");
+                Prediction { recording: recording.to_owned(), in_scene: in_scene.cloned(), ..row }
+            };
+            Predictions { predictions: ["r", "s"].map(of).to_vec() }
+        };
+        // Four clips a recording: six pairs of each of two joints.
+        let apart = evaluate(&rows(None), &truths).pairs.unwrap();
+        assert_eq!((apart.predicted_pairs, apart.true_pairs, apart.both), (0, 12, 0));
+        let scene = InScene { scene: "both".to_owned(), own_from_scene: crate::math::Pose::identity() };
+        let together = evaluate(&rows(Some(&scene)), &truths).pairs.unwrap();
+        assert_eq!((together.predicted_pairs, together.true_pairs, together.both), (1, 12, 1));
     }
 
     #[test]

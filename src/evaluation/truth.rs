@@ -1,7 +1,7 @@
 //! `predictions.json` and `ground_truth.json`.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +9,7 @@ use crate::articulation::{Action, JointKind};
 use crate::error::{Error, Result};
 use crate::inference::Uncertainty;
 use crate::json;
-use crate::math::{Point, Vector, unit};
+use crate::math::{Point, Pose, Vector, length, plain, rounded, unit};
 use crate::twin::OrientedBox;
 
 /// All predictions of a file.
@@ -80,11 +80,45 @@ pub struct Prediction {
     /// What physics says against ways in which the part could move, where it was asked.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub refuted: Vec<String>,
+    /// Of a scene of several recordings: all of the row is in its world. Else it is in the recording's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub in_scene: Option<InScene>,
+}
+
+/// The scene of several recordings that a prediction is part of.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct InScene {
+    /// Its name.
+    pub scene: String,
+    /// Its world to that of the prediction's recording.
+    pub own_from_scene: Pose,
+}
+
+impl Prediction {
+    /// The same in the world of its own recording, where the truth is.
+    #[must_use]
+    pub fn in_own_world(&self) -> Self {
+        let Some(InScene { own_from_scene: pose, .. }) = &self.in_scene else { return self.clone() };
+        Self {
+            axis: self.axis.map(|axis| pose * axis),
+            origin: self.origin.map(|p| pose * p),
+            contact_pivot: self.contact_pivot.map(|p| pose * p),
+            part_box: self.part_box.map(|b| b.moved(pose)),
+            uncertainty: self.uncertainty.clone().map(|u| Uncertainty { across: u.across.map(|a| pose * a), ..u }),
+            ..self.clone()
+        }
+    }
 }
 
 /// A value that may be null, but has to be there.
 fn said<'de, D: serde::Deserializer<'de>>(deserializer: D) -> std::result::Result<Option<JointKind>, D::Error> {
     Option::deserialize(deserializer)
+}
+
+/// Whether a pose that was read is one.
+fn is_rigid(pose: &Pose) -> bool {
+    let finite = pose.translation.vector.iter().all(|x| x.is_finite());
+    finite && (pose.rotation.coords.norm() - 1.0).abs() < 1e-6
 }
 
 /// What is wrong with the opening that a clip went through, rad or m.
@@ -94,18 +128,31 @@ fn range_fault(kind: JointKind, range: f64) -> Option<String> {
     // Nothing of a kitchen slides as far as a room is long.
     const ROOM_M: f64 = 10.0;
     if !range.is_finite() {
-        Some(format!("{range} is not finite"))
+        Some(format!("{} is not finite", plain(range)))
     } else if range < -ROUNDING {
         Some(format!(
-            "{range} is negative: how far the clip opened or closed the part is wanted; the axis says which way opens"
+            "{} is negative: how far the clip opened or closed the part is wanted; the axis says which way opens",
+            plain(range)
         ))
     } else if kind == JointKind::Revolute && range > std::f64::consts::TAU {
-        Some(format!("{range} rad is more than a whole turn: are these degrees?"))
+        Some(format!("{} rad is more than a whole turn: are these degrees?", plain(range)))
     } else if kind == JointKind::Prismatic && range > ROOM_M {
-        Some(format!("{range} m is longer than a room: are these millimetres or centimetres?"))
+        Some(format!("{} m is longer than a room: are these millimetres or centimetres?", plain(range)))
     } else {
         None
     }
+}
+
+/// What is wrong with a point of the world, metres.
+fn place_fault(point: &Point) -> Option<String> {
+    // Coordinates of maps are as large.
+    const FARTHEST_M: f64 = 1e8;
+    let far = length(&point.coords);
+    if !far.is_finite() {
+        return Some("is not finite".to_owned());
+    }
+    (far > FARTHEST_M)
+        .then(|| format!("lies {} m from the world's origin, farther than anything on Earth", rounded(far, 0)))
 }
 
 impl Predictions {
@@ -133,6 +180,10 @@ impl Predictions {
             if p.range_std.is_some_and(|std| !std.is_finite() || std <= 0.0) {
                 return Err(Error::format(path, place, "range_std must be finite and positive"));
             }
+            if p.in_scene.as_ref().is_some_and(|s| !is_rigid(&s.own_from_scene)) {
+                let message = "in_scene: own_from_scene must be finite, its rotation a quaternion of length 1";
+                return Err(Error::format(path, place, message));
+            }
             let Some(kind) = p.kind else { continue };
             if let Some(fault) = p.range.and_then(|range| range_fault(kind, range)) {
                 return Err(Error::format(path, place, format!("range: {fault}")));
@@ -144,8 +195,14 @@ impl Predictions {
             if let Some(Err(fault)) = p.uncertainty.as_ref().map(|u| u.check(&axis)) {
                 return Err(Error::format(path, place, format!("uncertainty: {fault}")));
             }
-            if p.origin.is_some_and(|o| o.coords.iter().any(|x| !x.is_finite())) {
-                return Err(Error::format(path, place, "the origin is not finite"));
+            for (name, point) in [
+                ("origin", p.origin),
+                ("contact_pivot", p.contact_pivot),
+                ("part_box: center", p.part_box.map(|b| b.center)),
+            ] {
+                if let Some(fault) = point.and_then(|point| place_fault(&point)) {
+                    return Err(Error::format(path, place, format!("{name}: {fault}")));
+                }
             }
         }
         Ok(all)
@@ -159,6 +216,8 @@ pub struct Truth {
     pub recording: String,
     /// How noisy the recording is, as its maker calls it; else the word for it in the recording's name.
     pub tier: Option<String>,
+    /// The place that was recorded, as all recordings of it call it, with the same joints; `None` where nobody says so.
+    pub place: Option<String>,
     /// Every narrated clip; `None` where it moves no joint.
     pub clips: BTreeMap<String, Option<TrueClip>>,
 }
@@ -235,6 +294,8 @@ struct TruthFile {
     tier: Option<String>,
     #[serde(default)]
     up: Option<Vector>,
+    #[serde(default)]
+    kitchen: Option<String>,
     joints: Vec<TrueJoint>,
     clips: Vec<TruthClip>,
 }
@@ -313,8 +374,25 @@ impl Truth {
             };
             clips.insert(clip.clip, Some(entry));
         }
-        Ok(Self { recording, tier, clips })
+        Ok(Self { recording, tier, place: truth.kitchen, clips })
     }
+}
+
+/// Reads something of each of several recordings, in their order, and tells why others are left out: one that cannot be read
+/// costs only itself.
+///
+/// # Errors
+/// That of the only recording.
+pub fn read_each<T>(recordings: &[PathBuf], read: impl Fn(&Path) -> Result<T>) -> Result<(Vec<T>, Vec<Error>)> {
+    let (mut found, mut left_out) = (Vec::new(), Vec::new());
+    for folder in recordings {
+        match read(folder) {
+            Ok(one) => found.push(one),
+            Err(error) if recordings.len() == 1 => return Err(error),
+            Err(error) => left_out.push(error),
+        }
+    }
+    Ok((found, left_out))
 }
 
 /// The word for how noisy a recording is in its name.
@@ -329,10 +407,54 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_recording_that_cannot_be_read_costs_only_itself() {
+        let folders = ["a", "b", "c"].map(PathBuf::from);
+        let read = |folder: &Path| match folder.to_str() {
+            Some("b") => Err(Error::format(folder, "file", "is broken")),
+            name => Ok(name.map(str::to_owned)),
+        };
+        let (found, left_out) = read_each(&folders, read).unwrap();
+        assert_eq!(found, [Some("a".to_owned()), Some("c".to_owned())]);
+        assert_eq!(left_out.len(), 1);
+        assert!(read_each(&folders[1..2], read).is_err());
+        assert!(read_each(&[], read).unwrap().0.is_empty());
+    }
+
+    #[test]
     fn a_tier_is_a_word_of_the_name_not_a_part_of_one() {
         assert_eq!(tier_in("apartment_Hard").as_deref(), Some("hard"));
         assert_eq!(tier_in("T2-0013").as_deref(), Some("t2"));
         assert_eq!(tier_in("hardware_store"), None);
+    }
+
+    #[test]
+    fn a_row_of_a_scene_is_judged_in_its_recordings_own_world() {
+        let turn = crate::math::rotation(&Vector::z(), std::f64::consts::FRAC_PI_2);
+        let own_from_scene = Pose::from_parts(Vector::new(0.0, 0.0, 1.0).into(), turn);
+        let row = Prediction {
+            kind: Some(JointKind::Prismatic),
+            axis: Some(Vector::x()),
+            origin: Some(Point::new(2.0, 0.0, 0.0)),
+            in_scene: Some(InScene { scene: "s".to_owned(), own_from_scene }),
+            ..Prediction::default()
+        };
+        let own = row.in_own_world();
+        assert!((own.axis.unwrap() - Vector::y()).norm() < 1e-12);
+        assert!((own.origin.unwrap() - Point::new(0.0, 2.0, 1.0)).norm() < 1e-12);
+        let alone = Prediction { in_scene: None, ..row.clone() };
+        assert_eq!(alone.in_own_world(), alone);
+        // Written and read back as it is; a pose that is none is told.
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("p.json");
+        let all = Predictions { predictions: vec![row] };
+        std::fs::write(&path, crate::json::text(&all).unwrap()).unwrap();
+        assert_eq!(Predictions::read(&path).unwrap(), all);
+        let mut broken = all;
+        let long = nalgebra::Unit::new_unchecked(nalgebra::Quaternion::new(2.0, 0.0, 0.0, 0.0));
+        let pose = Pose::from_parts(Vector::zeros().into(), long);
+        broken.predictions[0].in_scene = Some(InScene { scene: "s".to_owned(), own_from_scene: pose });
+        std::fs::write(&path, crate::json::text(&broken).unwrap()).unwrap();
+        assert!(Predictions::read(&path).unwrap_err().to_string().contains("own_from_scene"));
     }
 
     #[test]

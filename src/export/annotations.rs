@@ -10,7 +10,7 @@ use crate::json;
 use crate::math::Point;
 use crate::twin::{Furniture, OrientedBox, Part, Solid, Twin};
 
-/// As far as a reconstruction's points lie beside the boxes that stand for their surfaces, metres: USDNet's own tolerance when
+/// Format: as far as a reconstruction's points lie beside the boxes that stand for their surfaces, metres: USDNet's own tolerance when
 /// it looks for the points of a part's mesh.
 const ON_PART_M: f64 = 0.02;
 
@@ -188,6 +188,7 @@ fn distance(shape: &OrientedBox, p: &Point) -> f64 {
 
 /// The processed points as an npy file.
 fn rows(cloud: &Cloud, places: &[Option<(usize, bool)>], class: &dyn Fn(usize) -> usize) -> Vec<u8> {
+    /// Format: columns of a row.
     const COLUMNS: usize = 13;
     let mut bytes = npy_header(cloud.points.len(), COLUMNS);
     for (i, (p, place)) in cloud.points.iter().zip(places).enumerate() {

@@ -10,7 +10,7 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 use rayon::prelude::*;
 
-use super::{ROOM, is_name};
+use super::shared::{self, ROOM, is_name};
 use crate::error::{Error, Result};
 use crate::look::{Look, Texture, TexturedMesh};
 use crate::math::{Point, Vector, unit};
@@ -21,18 +21,20 @@ use crate::twin::{FAR_M, Twin};
 pub const FOLDER: &str = "look";
 /// Materials of all OBJ files.
 const MATERIALS: &str = "look.mtl";
-/// Steps of positions per metre: a tenth of a millimetre is below what any depth tells, and its numbers are short as text.
+/// Format: steps of positions per metre, a tenth of a millimetre is below what any depth tells, and its numbers are short as text.
 const STEPS_PER_M: f64 = 1e4;
-/// Steps of normals' coordinates: a twentieth of a degree.
+/// Format: steps of normals' coordinates, a twentieth of a degree.
 const STEPS_OF_NORMALS: f64 = 1e3;
-/// Rounded normals that are this near to length 1 are left as they are. Rounding takes less, glTF's validator minds six times
+/// Format: steps of a texture's coordinates as text.
+const STEPS_OF_SHARES: f64 = 1e4;
+/// Format: rounded normals that are this near to length 1 are left as they are. Rounding takes less, glTF's validator minds six times
 /// as much.
 const UNIT_NORMAL: f64 = 1e-3;
-/// A mesh is flat where no vertex is farther from its plane, metres: MuJoCo refuses what has no volume, whoever shows it.
+/// Format: a mesh is flat where no vertex is farther from its plane, metres: MuJoCo refuses what has no volume, whoever shows it.
 const FLAT_M: f64 = 5e-4;
-/// Edge of what gives a flat mesh a volume, metres: too small to be seen.
+/// Format: edge of what gives a flat mesh a volume, metres: too small to be seen.
 const PEBBLE_M: f64 = 1e-3;
-/// Of 100. What JPEG takes away is then less than a texture's colours are off; a picture takes about a fifth of a byte a pixel.
+/// Format: of 100; what JPEG takes away is then less than a texture's colours are off; a picture takes about a fifth of a byte a pixel.
 const JPEG_QUALITY: u8 = 85;
 
 /// One mesh of one link.
@@ -72,7 +74,7 @@ impl<'a> Dress<'a> {
     /// # Errors
     /// Where the twin cannot be a simulator's model (see [`super::check`]), or what is wrong with the look.
     pub fn of(twin: &Twin, look: Option<&'a Look>) -> Result<Self> {
-        let mut names = super::names(twin)?;
+        let mut names = shared::names(twin)?;
         let Some(look) = look else { return Ok(Self::default()) };
         check_textures(&look.textures)?;
         let mut dress = Self { room: pieces(look, ROOM, &look.room, &Point::origin())?, ..Self::default() };
@@ -230,11 +232,11 @@ fn rounded(v: &Vector, steps: f64) -> [f32; 3] {
     [v.x, v.y, v.z].map(|c| ((c * steps).round() / steps) as f32 + 0.0)
 }
 
-/// A coordinate of a texture as text: its fifth digit is a tenth of a pixel of the largest pictures.
+/// A coordinate of a texture as text: half of its fourth digit is a fifth of a pixel of the largest pictures.
 pub(crate) fn share_text(share: u16, flipped: bool) -> String {
     let share = f64::from(share) / 65535.0;
     let share = if flipped { 1.0 - share } else { share };
-    ((share * 1e5).round() / 1e5).to_string()
+    ((share * STEPS_OF_SHARES).round() / STEPS_OF_SHARES).to_string()
 }
 
 /// A mesh as OBJ without normals, which readers make themselves: they would be a third of the file.

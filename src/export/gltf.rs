@@ -7,26 +7,28 @@ use gltf::binary::{Glb, Header};
 use serde_json::{Value, json};
 
 use super::dress::{self, Dress, Piece};
-use super::{ROLES, ROOM, color, from_x, material, principal};
+use super::shared::{ROLES, ROOM, check, color, from_x, local_pose, material, principal};
 use crate::articulation::JointKind;
 use crate::error::{Error, Result};
 use crate::look::{Look, Texture};
-use crate::math::{Point, rotation};
+use crate::math::{Point, Pose, Vector, rotation};
 use crate::twin::{Part, Solid, Twin, mass_properties};
 
 /// Extensions of the file with physics. Readers that do not know them still show the scene: none is required.
 const RIGID_BODIES: &str = "KHR_physics_rigid_bodies";
 const SHAPES: &str = "KHR_implicit_shapes";
-/// Seconds to open; closing takes as long again.
+/// Format: seconds to open; closing takes as long again.
 const OPEN_SECS: f32 = 1.5;
-/// Rotations are interpolated the short way round: keyframes lie at most this far apart.
+/// Format: rotations are interpolated the short way round: keyframes lie at most this far apart.
 const MAX_STEP_RAD: f64 = 1.2;
 
-/// What views of the buffer are for.
+/// Format: what views of the buffer are for, vertices.
 const ARRAY_BUFFER: u32 = 34962;
+/// Format: and indices.
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
-/// Component types of accessors.
+/// Format: component type of an accessor.
 const U16: u32 = 5123;
+/// Format: another one.
 const U32: u32 = 5125;
 
 /// Verdicts to show with the joints: (joint id, verdict).
@@ -34,13 +36,13 @@ pub type Verdicts<'a> = &'a [(String, String)];
 
 /// Bytes of the binary chunk, and the accessors into them.
 #[derive(Default)]
-struct Buffer {
+struct GltfBuffer {
     bytes: Vec<u8>,
     views: Vec<Value>,
     accessors: Vec<Value>,
 }
 
-impl Buffer {
+impl GltfBuffer {
     /// Adds a view; returns its index.
     fn view(&mut self, data: &[u8], target: Option<u32>) -> usize {
         while !self.bytes.len().is_multiple_of(4) {
@@ -107,19 +109,34 @@ impl Buffer {
     }
 }
 
+/// Where a camera (OpenCV axes, `world_from_camera`) stands in the files written here: a matrix, column by column, to their
+/// scene (+Y up) from a camera that looks along its -Z with +Y up.
+#[must_use]
+pub fn camera(world_from_camera: &Pose) -> [f64; 16] {
+    let turn = rotation(&Vector::x(), -std::f64::consts::FRAC_PI_2);
+    let over = rotation(&Vector::x(), std::f64::consts::PI);
+    let pose = Pose::from_parts(
+        (turn * world_from_camera.translation.vector).into(),
+        turn * world_from_camera.rotation * over,
+    );
+    let matrix = pose.to_homogeneous();
+    // Micrometres; no minus zero.
+    std::array::from_fn(|i| (matrix[(i % 4, i / 4)] * 1e6).round() / 1e6 + 0.0)
+}
+
 /// A file in the making.
-struct Scene {
-    buffer: Buffer,
+struct GltfDocument {
+    buffer: GltfBuffer,
     meshes: Vec<Value>,
     materials: Vec<Value>,
     nodes: Vec<Value>,
     images: Vec<Value>,
 }
 
-impl Scene {
+impl GltfDocument {
     /// Materials, one box mesh a role, and node 0: -90 degrees about x turn +Z up into +Y up.
     fn new() -> Self {
-        let mut buffer = Buffer::default();
+        let mut buffer = GltfBuffer::default();
         let (positions, normals, indices) = unit_cube(&mut buffer);
         let materials = ROLES
             .iter()
@@ -224,7 +241,7 @@ impl Scene {
 /// Where the twin cannot be a scene (see [`super::check`]), or what is wrong with the look.
 pub fn write(twin: &Twin, look: Option<&Look>, verdicts: Verdicts) -> Result<Vec<u8>> {
     let dress = Dress::of(twin, look)?;
-    let mut scene = Scene::new();
+    let mut scene = GltfDocument::new();
     scene.pictures(dress.textures)?;
     let fixed = dress.room.is_empty();
     let mut roots = Vec::new();
@@ -272,8 +289,8 @@ pub fn write(twin: &Twin, look: Option<&Look>, verdicts: Verdicts) -> Result<Vec
 /// # Errors
 /// Where the twin cannot be a scene (see [`super::check`]).
 pub fn write_physics(twin: &Twin) -> Result<Vec<u8>> {
-    super::check(twin)?;
-    let mut scene = Scene::new();
+    check(twin)?;
+    let mut scene = GltfDocument::new();
     let (mut shapes, mut joints, mut roots) = (Vec::new(), Vec::new(), Vec::new());
     for f in &twin.furniture {
         let part = &f.part;
@@ -386,10 +403,10 @@ fn limits(part: &Part) -> Value {
 }
 
 /// Boxes as colliders, each with its picture below it: a collider's node is not scaled. Returns the colliders' nodes.
-fn colliders(scene: &mut Scene, shapes: &mut Vec<Value>, solids: &[Solid], origin: &Point) -> Vec<usize> {
+fn colliders(scene: &mut GltfDocument, shapes: &mut Vec<Value>, solids: &[Solid], origin: &Point) -> Vec<usize> {
     let mut nodes = Vec::with_capacity(solids.len());
     for s in solids {
-        let pose = super::local_pose(&s.shape, origin);
+        let pose = local_pose(&s.shape, origin);
         let q = pose.rotation.quaternion();
         let size = array((s.shape.half * 2.0).as_slice());
         let picture = scene.push(json!({"name": format!("{}_visual", s.name), "mesh": mesh(s), "scale": size}));
@@ -422,7 +439,7 @@ fn array(values: &[f64]) -> Vec<f64> {
 
 /// Adds a box's node, with its mesh where it is `shown`: the node's scale is the box's size in any case.
 fn push_box(nodes: &mut Vec<Value>, solid: &Solid, origin: &Point, shown: bool) -> usize {
-    let pose = super::local_pose(&solid.shape, origin);
+    let pose = local_pose(&solid.shape, origin);
     let q = pose.rotation.quaternion();
     let mut node = json!({
         "name": solid.name,
@@ -439,7 +456,7 @@ fn push_box(nodes: &mut Vec<Value>, solid: &Solid, origin: &Point, shown: bool) 
 }
 
 /// A cube of side 1 with flat normals: accessors of positions, normals, indices.
-fn unit_cube(buffer: &mut Buffer) -> (usize, usize, usize) {
+fn unit_cube(buffer: &mut GltfBuffer) -> (usize, usize, usize) {
     let (mut positions, mut normals, mut indices) = (Vec::new(), Vec::new(), Vec::<u16>::new());
     for axis in 0..3 {
         for sign in [-1.0f32, 1.0] {
@@ -466,7 +483,7 @@ fn unit_cube(buffer: &mut Buffer) -> (usize, usize, usize) {
 }
 
 /// Closed, open, closed.
-fn animation(buffer: &mut Buffer, node: usize, part: &Part) -> Value {
+fn animation(buffer: &mut GltfBuffer, node: usize, part: &Part) -> Value {
     let phi = part.joint.articulation;
     let steps = match phi.kind {
         JointKind::Revolute => (part.joint.upper / MAX_STEP_RAD).ceil().max(1.0) as usize,

@@ -10,7 +10,7 @@ use urdf_rs::{
 };
 
 use super::dress::{self, Dress, Piece};
-use super::{ROLES, ROOM, color, local_pose, material};
+use super::shared::{ROLES, ROOM, color, local_pose, material};
 use crate::articulation::JointKind;
 use crate::error::{Error, Result};
 use crate::look::Look;

@@ -9,19 +9,18 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use super::dress::{self, Dress, Piece};
-use super::{ROLES, ROOM, color, from_x, local_pose, material, mjcf, principal};
+use super::shared::{MATERIALS, ROLES, ROOM, ROOT, color, from_x, local_pose, material, principal};
 use crate::articulation::JointKind;
 use crate::error::{Error, Result};
 use crate::look::{Look, Texture};
 use crate::math::{Point, Vector};
 use crate::twin::{Furniture, Solid, Twin, mass_properties};
 
-/// The default prim: what a stage that references the file gets.
-const ROOT: &str = mjcf::ROOT;
-/// The scope of the materials.
-pub(crate) const MATERIALS: &str = "materials";
-/// m/s^2.
+/// Format: gravity, m/s^2.
 const GRAVITY: f64 = 9.81;
+
+/// Format: steps of normals' coordinates; half a degree is not seen, and its numbers are short.
+const STEPS_OF_NORMALS: f64 = 100.0;
 
 /// What a reader of the file must know that its attributes do not say.
 const DOC: &str = "Metres, kilograms, +Z up. Limits and damping of hinges are per degree, as UsdPhysics has them; \
@@ -239,7 +238,6 @@ fn textured(out: &mut Usda, name: &str, file: &str) {
 fn furniture(out: &mut Usda, f: &Furniture, density: f64, dress: &Dress) {
     let part = &f.part;
     let phi = part.joint.articulation;
-    let origin = phi.origin.coords;
     let group = format!("{}_furniture", part.id);
     let path = format!("/{ROOT}/{group}");
     let link = format!("{}_link", part.id);
@@ -262,6 +260,14 @@ fn furniture(out: &mut Usda, f: &Furniture, density: f64, dress: &Dress) {
     frames(out, &Vector::zeros(), &UnitQuaternion::identity());
     out.close();
 
+    joint(out, f, &path, &link);
+    out.close();
+}
+
+/// The joint of a part; `path` is its furniture's, `link` its body.
+fn joint(out: &mut Usda, f: &Furniture, path: &str, link: &str) {
+    let part = &f.part;
+    let phi = part.joint.articulation;
     let (kind, drive) = match phi.kind {
         JointKind::Revolute => ("PhysicsRevoluteJoint", "angular"),
         JointKind::Prismatic => ("PhysicsPrismaticJoint", "linear"),
@@ -288,7 +294,7 @@ fn furniture(out: &mut Usda, f: &Furniture, density: f64, dress: &Dress) {
     out.line(&format!("rel physics:body1 = <{path}/{link}>"));
     out.line("bool physics:collisionEnabled = 0");
     // Axes are X, Y or Z of the joint's frames: the frames are turned, the axis' sign with them.
-    frames(out, &origin, &from_x(&phi.axis));
+    frames(out, &phi.origin.coords, &from_x(&phi.axis));
     out.line("float physics:lowerLimit = 0");
     out.line(&format!("float physics:upperLimit = {}", single(upper)));
     for (key, value) in
@@ -297,7 +303,6 @@ fn furniture(out: &mut Usda, f: &Furniture, density: f64, dress: &Dress) {
         out.line(&format!("float drive:{drive}:physics:{key} = {}", single(value)));
     }
     out.line(&format!("uniform token drive:{drive}:physics:type = \"force\""));
-    out.close();
     out.close();
 }
 
@@ -362,7 +367,8 @@ fn meshes(out: &mut Usda, pieces: &[Piece]) {
         let material = dress::material(piece.texture);
         out.line(&format!("rel material:binding = </{ROOT}/{MATERIALS}/{material}>"));
         let each = "(interpolation = \"vertex\")";
-        out.line(&format!("normal3f[] normals = {} {each}", tuples(piece.normals.iter().map(three))));
+        let short = |c: f32| ((f64::from(c) * STEPS_OF_NORMALS).round() / STEPS_OF_NORMALS + 0.0).to_string();
+        out.line(&format!("normal3f[] normals = {} {each}", tuples(piece.normals.iter().map(|n| n.map(short)))));
         out.line(&format!("point3f[] points = {}", tuples(piece.positions.iter().map(three))));
         let st = piece.uv.iter().map(|[u, v]| [dress::share_text(*u, false), dress::share_text(*v, true)]);
         out.line(&format!("texCoord2f[] primvars:st = {} {each}", tuples(st)));

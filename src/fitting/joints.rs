@@ -5,26 +5,27 @@ use std::collections::BTreeSet;
 use nalgebra::{Matrix3, UnitQuaternion};
 use serde::Deserialize;
 
-use super::{Plan, bounds_of, limits, overlap, placing::place};
+use super::joint_front::{LEAF_M, front_of, front_side};
+use super::{Plan, Rules, bounds_of, limits, overlap, placing::place};
 use crate::articulation::{Articulation, JointKind};
-use crate::config;
+use crate::config::{self, Priors};
 use crate::error::{Error, Result};
-use crate::geometry::Face;
-use crate::geometry::Rect;
-use crate::math::{Point, Vector, reject, unit};
+use crate::geometry::{Face, Rect};
+use crate::math::{Point, Vector, length, plain, reject, rounded, unit};
 use crate::pipeline::SceneJoint;
 use crate::twin::{Furniture, LeftOut, OrientedBox, Role, Solid, Twin};
 
-/// Coordinates beyond this are millimetres or centimetres that nobody has converted: no home is as wide.
+/// Format: coordinates beyond this are millimetres or centimetres that nobody has converted: no home is as wide.
 const FAR_M: f64 = 100.0;
-/// Half sizes and travels beyond this are, too.
+/// Format: half sizes and travels beyond this are, too.
 const LARGE_M: f64 = 10.0;
-/// What is thinner slides along its own face, if its motion is square to its thickness and its face upright: a door.
-const LEAF_M: f64 = 0.06;
-/// A front that a handle fits on.
-const LEAST_FRONT_M: f64 = 0.05;
-/// Where nothing tells the handle, it is this far from the free edge.
-const RIM_M: f64 = 0.05;
+/// Format: a hinge opens by half a turn at most, radians; files round.
+const MOST_TURN_RAD: f64 = std::f64::consts::PI + 0.1;
+/// Format: boxes are measured to centimetres, and rails pull out a little further than a drawer is long, metres.
+const OVERRUN_M: f64 = 0.05;
+
+/// Format: how deep furniture is taken to be, whatever a file says, metres.
+const DEPTHS_M: [f64; 2] = [0.15, 5.0];
 
 /// Length of one unit of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
@@ -110,7 +111,7 @@ struct Found {
 ///
 /// # Errors
 /// Naming the joint, the field, and what it should be.
-pub fn from_joints(file: &JointsFile, config: &config::Fitting) -> Result<Twin> {
+pub fn from_joints(file: &JointsFile, config: &config::Fitting, priors: &Priors) -> Result<Twin> {
     if file.joints.is_empty() {
         return Err(Error::Export("joints: the list is empty".to_owned()));
     }
@@ -121,10 +122,10 @@ pub fn from_joints(file: &JointsFile, config: &config::Fitting) -> Result<Twin> 
         if !ids.insert(entry.id.as_str()) {
             return Err(fault(&entry.id, "id", "is used twice"));
         }
-        all.push(found(entry, &frame, config)?);
+        all.push(found(entry, &frame, priors)?);
     }
     let mut rects: Vec<(Face, Rect)> = all.iter().map(|f| (f.face, f.rect)).collect();
-    overlap::separate(&mut rects, config);
+    overlap::separate(&mut rects, &priors.boards);
     let mut placed: Vec<(usize, Furniture)> = Vec::new();
     let mut left_out = Vec::new();
     for (i, (found, (face, rect))) in all.iter().zip(rects).enumerate() {
@@ -135,12 +136,14 @@ pub fn from_joints(file: &JointsFile, config: &config::Fitting) -> Result<Twin> 
             face,
             rect,
             seen: true,
+            assumed: false,
             up: Vector::z(),
         };
-        let config = config::Fitting { carcass_depth_m: found.depth, ..config.clone() };
-        let built = place(&plan, &placed, &config)
+        let boards = config::Boards { carcass_depth_m: found.depth, ..priors.boards.clone() };
+        let own = Priors { boards, ..priors.clone() };
+        let built = place(&plan, &placed, Rules { config, priors: &own })
             .map_err(|why| why.told("its front shares space with furniture before it in the list"))
-            .and_then(|piece| finished(piece, found, &placed, config.density_kg_per_m3).map_err(str::to_owned))
+            .and_then(|piece| finished(piece, found, &placed, Rules { config, priors }).map_err(str::to_owned))
             .and_then(|piece| piece.check().map(|()| piece));
         match built {
             Ok(piece) => placed.push((i, piece)),
@@ -149,7 +152,7 @@ pub fn from_joints(file: &JointsFile, config: &config::Fitting) -> Result<Twin> 
     }
     Ok(Twin {
         name: file.scene.clone(),
-        density_kg_per_m3: config.density_kg_per_m3,
+        density_kg_per_m3: priors.boards.density_kg_per_m3,
         furniture: placed.into_iter().map(|(_, f)| f).collect(),
         room: Vec::new(),
         left_out,
@@ -161,8 +164,9 @@ fn finished(
     mut piece: Furniture,
     found: &Found,
     placed: &[(usize, Furniture)],
-    density: f64,
+    rules: Rules,
 ) -> std::result::Result<Furniture, &'static str> {
+    /// Numerics: poses on the way that are looked at.
     const STEPS: u32 = 20;
     let part = &mut piece.part;
     // The range is given: nothing is expected beyond it.
@@ -178,7 +182,8 @@ fn finished(
         part.solids = own.chain(handle).collect();
         part.bounds = bounds_of(&part.solids, &found.face);
     }
-    part.joint.balanced = limits::balanced(part, &Vector::z(), density, &[]);
+    part.joint.balanced =
+        limits::balanced(part, &Vector::z(), rules.priors.boards.density_kg_per_m3, &[], rules.config);
     let (joint, solids) = (part.joint, &part.solids);
     let way: Vec<OrientedBox> = (0..=STEPS)
         .map(|i| joint.articulation.motion(joint.upper * f64::from(i) / f64::from(STEPS)))
@@ -194,7 +199,8 @@ fn finished(
     Ok(piece)
 }
 
-fn fault(id: &str, field: &str, message: &str) -> Error {
+/// An error that names the joint and the field.
+pub(super) fn fault(id: &str, field: &str, message: &str) -> Error {
     Error::Export(format!("joint {id}: {field}: {message}"))
 }
 
@@ -210,9 +216,9 @@ impl Frame {
             return Err(fault(id, field, "has a coordinate that is not a finite number"));
         }
         let p = Point::from(self.turn * p.coords * self.metres);
-        if p.coords.norm() > FAR_M {
-            let message = format!("lies {:.0} m from the origin; {HINT}", p.coords.norm());
-            return Err(fault(id, field, &message));
+        let far = length(&p.coords);
+        if far > FAR_M {
+            return Err(fault(id, field, &format!("lies {} m from the origin; {HINT}", rounded(far, 0))));
         }
         Ok(p)
     }
@@ -231,7 +237,7 @@ impl Frame {
             return Err(fault(id, &format!("{field}.half"), "half sizes must be positive"));
         }
         if half.max() > LARGE_M {
-            let message = format!("a half size is {:.0} m; {HINT}", half.max());
+            let message = format!("a half size is {} m; {HINT}", rounded(half.max(), 0));
             return Err(fault(id, &format!("{field}.half"), &message));
         }
         // Files round: orthonormal to three digits is meant to be a rotation.
@@ -279,10 +285,10 @@ fn articulation(entry: &Entry, frame: &Frame) -> Result<(Articulation, f64)> {
         None => return Err(missing("type")),
     };
     let axis = entry.axis.ok_or_else(|| missing("axis"))?;
-    let length = axis.norm();
+    let long = length(&axis);
     // Not a number is not near one either.
-    if (length - 1.0).abs().is_nan() || (length - 1.0).abs() > 1e-3 {
-        return Err(fault(id, "axis", &format!("has length {length:.4}: a unit vector is needed")));
+    if (long - 1.0).abs().is_nan() || (long - 1.0).abs() > 1e-3 {
+        return Err(fault(id, "axis", &format!("has length {}: a unit vector is needed", rounded(long, 4))));
     }
     let axis = frame.direction(id, "axis", &axis)?;
     let origin = frame.point(id, "origin", &entry.origin.ok_or_else(|| missing("origin"))?)?;
@@ -298,22 +304,27 @@ fn articulation(entry: &Entry, frame: &Frame) -> Result<(Articulation, f64)> {
         return Err(fault(
             id,
             "range",
-            &format!("[{low}, {high}] is reversed: the lower limit comes first, 0 is closed"),
+            &format!("[{}, {}] is reversed: the lower limit comes first, 0 is closed", plain(low), plain(high)),
         ));
     }
     let joint = Articulation { kind, axis, origin };
     let (joint, upper) = if high >= -low { (joint, high) } else { (joint.reversed(), -low) };
+    let opens = rounded(upper, 1);
     match kind {
         JointKind::Revolute if upper > std::f64::consts::TAU => {
-            Err(fault(id, "range", &format!("opens by {upper:.1} rad: are these degrees?")))
+            Err(fault(id, "range", &format!("opens by {opens} rad: are these degrees?")))
         }
-        JointKind::Prismatic if upper > LARGE_M => Err(fault(id, "range", &format!("opens by {upper:.1} m; {HINT}"))),
+        JointKind::Revolute if upper > MOST_TURN_RAD => {
+            let message = format!("opens by {opens} rad, more than half a turn: are these degrees? 0 is closed");
+            Err(fault(id, "range", &message))
+        }
+        JointKind::Prismatic if upper > LARGE_M => Err(fault(id, "range", &format!("opens by {opens} m; {HINT}"))),
         _ => Ok((joint, upper)),
     }
 }
 
 /// Checks an entry and finds its front.
-fn found(entry: &Entry, frame: &Frame, config: &config::Fitting) -> Result<Found> {
+fn found(entry: &Entry, frame: &Frame, priors: &Priors) -> Result<Found> {
     let id = entry.id.as_str();
     if id.is_empty()
         || !id.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
@@ -335,15 +346,16 @@ fn found(entry: &Entry, frame: &Frame, config: &config::Fitting) -> Result<Found
         .map(|(i, b)| frame.shape(id, &format!("boxes[{i}]"), b))
         .collect::<Result<_>>()?;
 
-    let out = outward(id, &joint, &part, handle.as_ref(), front.as_ref())?;
-    let (face, rect, thick) = front_of(id, &joint, &part, handle.as_ref(), &out)?;
+    let out = front_side(id, &joint, &part, handle.as_ref(), front.as_ref())?;
+    let (face, rect, thick) = front_of(id, &joint, &part, handle.as_ref(), &out, &priors.handles)?;
     let grip = handle.unwrap_or(face.center);
     // As deep as its furniture, else as a part that is a drawer, else as furniture is.
     let depth = match base {
         Some(base) => base.corners().iter().map(|c| -face.coordinates(c)[2]).fold(0.0, f64::max),
-        None if thick > LEAF_M => thick + config.board_m + 2.0 * config.clearance_m,
-        None => config.carcass_depth_m,
+        None if thick > LEAF_M => thick + priors.boards.thickness_m + 2.0 * priors.boards.gap_m,
+        None => priors.boards.carcass_depth_m,
     };
+    stays_in(id, &joint, upper, &[Some(part), base], if thick > LEAF_M { 0.0 } else { depth })?;
     let joint = SceneJoint {
         id: entry.id.clone(),
         joint,
@@ -360,7 +372,25 @@ fn found(entry: &Entry, frame: &Frame, config: &config::Fitting) -> Result<Found
         observed_range: upper,
         hypotheses: Vec::new(),
     };
-    Ok(Found { joint, face, rect, depth: depth.clamp(0.15, 5.0), boxes })
+    Ok(Found { joint, face, rect, depth: depth.clamp(DEPTHS_M[0], DEPTHS_M[1]), boxes })
+}
+
+/// A drawer stays in its furniture: it opens by no more than one of some boxes is long along its axis, or, where only its front
+/// is known, than furniture is deep.
+fn stays_in(id: &str, joint: &Articulation, upper: f64, boxes: &[Option<OrientedBox>], depth: f64) -> Result<()> {
+    if joint.kind == JointKind::Revolute {
+        return Ok(());
+    }
+    let along = |b: &OrientedBox| 2.0 * (b.rotation.transpose() * joint.axis).abs().dot(&b.half);
+    let long = boxes.iter().flatten().map(along).fold(depth, f64::max);
+    if upper <= long + OVERRUN_M {
+        return Ok(());
+    }
+    let message = format!(
+        "opens by {upper:.2} m, and what slides is {long:.2} m long: a slide opens by its length at most; give the part's whole \
+         box, or the furniture's (base_box)"
+    );
+    Err(fault(id, "range", &message))
 }
 
 /// A leaf hangs at its hinge: one whose line passes it farther off than the leaf is large is in another frame or unit.
@@ -378,108 +408,6 @@ fn hangs_at(id: &str, joint: &Articulation, part: &OrientedBox) -> Result<()> {
         2.0 * radius
     );
     Err(fault(id, "origin", &message))
-}
-
-/// Which of a box's sides is the front: the index of its axis, and the direction out of it.
-struct Side {
-    axis: usize,
-    out: Vector,
-}
-
-/// The box's axis, with its sign, nearest to a direction, among some.
-fn nearest(part: &OrientedBox, direction: &Vector, among: &[usize]) -> Side {
-    let column = |i: usize| part.rotation.column(i).into_owned();
-    let best = among.iter().copied().fold(None, |best: Option<usize>, i| match best {
-        Some(b) if column(b).dot(direction).abs() >= column(i).dot(direction).abs() => best,
-        _ => Some(i),
-    });
-    let axis = best.unwrap_or(0);
-    let out = if column(axis).dot(direction) < 0.0 { -column(axis) } else { column(axis) };
-    Side { axis, out }
-}
-
-fn outward(
-    id: &str,
-    joint: &Articulation,
-    part: &OrientedBox,
-    handle: Option<&Point>,
-    front: Option<&Vector>,
-) -> Result<Side> {
-    let direction = match (front, joint.kind) {
-        (Some(front), _) => *front,
-        // Opening moves a leaf's middle out of its face.
-        (None, JointKind::Revolute) => unit(&joint.axis.cross(&(part.center - joint.origin)))
-            .ok_or_else(|| fault(id, "part_box", "its centre lies on the hinge; give \"front\""))?,
-        (None, JointKind::Prismatic) => {
-            let thin = part.half.imin();
-            let across = part.rotation.column(thin).into_owned();
-            let leaf = 2.0 * part.half[thin] < LEAF_M && across.dot(&joint.axis).abs() < 0.5 && across.z.abs() < 0.5;
-            match handle {
-                _ if !leaf => joint.axis,
-                Some(handle) => across * (handle - part.center).dot(&across).signum(),
-                None => {
-                    return Err(fault(id, "front", "is missing: nothing tells which way a sliding door looks"));
-                }
-            }
-        }
-    };
-    Ok(nearest(part, &direction, &[0, 1, 2]))
-}
-
-/// The face with the grip as its origin, the part's rectangle on it, and how thick the part is behind it.
-fn front_of(
-    id: &str,
-    joint: &Articulation,
-    part: &OrientedBox,
-    handle: Option<&Point>,
-    out: &Side,
-) -> Result<(Face, Rect, f64)> {
-    let others: Vec<usize> = (0..3).filter(|i| *i != out.axis).collect();
-    // Away from the hinge, in the face; zero on a slide.
-    let away = match joint.kind {
-        JointKind::Revolute => reject(&reject(&(part.center - joint.origin), &joint.axis), &out.out),
-        JointKind::Prismatic => Vector::zeros(),
-    };
-    // On a lid, up is towards the hinge, where the person is not.
-    let upward = if out.out.z.abs() > 0.7 { -away } else { Vector::z() };
-    let up = nearest(part, &upward, &others);
-    let right = others.iter().copied().find(|i| *i != up.axis).unwrap_or(up.axis);
-    let (half_right, half_up, half_out) = (part.half[right], part.half[up.axis], part.half[out.axis]);
-    for (what, half) in [("wide", half_right), ("tall", half_up)] {
-        if 2.0 * half < LEAST_FRONT_M {
-            let message = format!("its front is {:.3} m {what}: at least {LEAST_FRONT_M} m are needed", 2.0 * half);
-            return Err(fault(id, "part_box.half", &message));
-        }
-    }
-    let middle = part.center + out.out * half_out;
-    let mut face = Face {
-        center: middle,
-        right: up.out.cross(&out.out),
-        up: up.out,
-        normal: out.out,
-        extent: [[-half_right, half_right], [-half_up, half_up]],
-        support: 1.0,
-    };
-    let [r, u] = match handle {
-        Some(handle) => {
-            let [r, u, _] = face.coordinates(handle);
-            let outside = (r.abs() - half_right).max(u.abs() - half_up);
-            if outside > 2.0 * RIM_M {
-                return Err(fault(id, "handle", &format!("is {outside:.2} m beside the part's front")));
-            }
-            [r.clamp(-half_right, half_right), u.clamp(-half_up, half_up)]
-        }
-        None => {
-            let toward = [(face.right, half_right), (face.up, half_up)];
-            let free =
-                toward.map(|(d, half)| if d.dot(&away).abs() > 0.5 * half { d.dot(&away).signum() } else { 0.0 });
-            [0, 1].map(|i| free[i] * (toward[i].1 - RIM_M).max(0.0))
-        }
-    };
-    face.center = face.point(r, u, 0.0);
-    let rect = Rect { bounds: [[-half_right - r, half_right - r], [-half_up - u, half_up - u]] };
-    face.extent = rect.bounds;
-    Ok((face, rect, 2.0 * half_out))
 }
 
 #[cfg(test)]
@@ -507,7 +435,7 @@ mod tests {
     }
 
     fn built(file: &JointsFile) -> Twin {
-        let twin = from_joints(file, &config::Fitting::default()).unwrap();
+        let twin = from_joints(file, &config::Fitting::default(), &Priors::default()).unwrap();
         assert!(twin.left_out.is_empty(), "{:?}", twin.left_out);
         twin
     }
@@ -571,9 +499,24 @@ mod tests {
     }
 
     #[test]
+    fn a_slide_opens_by_its_length_at_most() {
+        let mut given = example();
+        for (upper, half_depth, fits) in [(0.42, 0.2, true), (3.0, 0.2, false), (0.5, 0.01, true), (1.0, 0.01, false)] {
+            let drawer = &mut given.joints[1];
+            drawer.range = Some([0.0, upper]);
+            drawer.part_box = drawer.part_box.map(|b| OrientedBox { half: Vector::new(0.3, half_depth, 0.1), ..b });
+            let made = from_joints(&given, &config::Fitting::default(), &Priors::default());
+            assert_eq!(made.is_ok(), fits, "{upper} {half_depth}: {:?}", made.err().map(|e| e.to_string()));
+        }
+        given.joints[1].base_box =
+            given.joints[1].part_box.map(|b| OrientedBox { half: Vector::new(0.3, 0.5, 0.1), ..b });
+        assert!(from_joints(&given, &config::Fitting::default(), &Priors::default()).is_ok());
+    }
+
+    #[test]
     fn errors_name_the_joint_and_the_field() {
         type Break = (fn(&mut Entry), &'static str);
-        let breaks: [Break; 15] = [
+        let breaks: [Break; 19] = [
             (|e| e.axis = Some(Vector::new(0.0, 0.0, 2.0)), "joint door: axis: has length 2"),
             (|e| e.axis = Some(Vector::repeat(f64::NAN)), "joint door: axis"),
             (|e| e.axis = None, "joint door: axis: is missing"),
@@ -581,6 +524,10 @@ mod tests {
             (|e| e.range = Some([1.0, 0.0]), "joint door: range: [1, 0] is reversed"),
             (|e| e.range = Some([0.0, 90.0]), "joint door: range: opens by 90.0 rad: are these degrees?"),
             (|e| e.range = Some([0.0, f64::INFINITY]), "joint door: range"),
+            (|e| e.range = Some([0.0, 5.0]), "joint door: range: opens by 5.0 rad, more than half a turn"),
+            (|e| e.range = Some([0.0, 1e200]), "joint door: range: opens by 1e200 rad"),
+            (|e| e.handle = Some(Point::new(0.25, -0.9, 1.0)), "joint door: handle: is 0.90 m before"),
+            (|e| e.origin = Some(Point::new(1e200, 0.0, 1.0)), "joint door: origin: lies 1e200 m"),
             (|e| e.origin = Some(Point::new(-300.0, 0.0, 1000.0)), "joint door: origin: lies 1044 m"),
             (|e| e.origin = Some(Point::new(-30.0, 0.0, 1.0)), "joint door: origin: the hinge passes 29.5 m beside"),
             (|e| e.part_box = None, "joint door: part_box: is missing"),
@@ -593,7 +540,7 @@ mod tests {
         for (break_it, words) in breaks {
             let mut broken = example();
             break_it(&mut broken.joints[0]);
-            let error = from_joints(&broken, &config::Fitting::default()).unwrap_err().to_string();
+            let error = from_joints(&broken, &config::Fitting::default(), &Priors::default()).unwrap_err().to_string();
             assert!(error.contains(words), "{error}, not {words}");
         }
     }

@@ -4,12 +4,12 @@
 //!
 //! | opens as | expected |
 //! |---|---|
-//! | leaf on an upright hinge | [`DOOR_DEG`] |
-//! | leaf hinged below (oven, dishwasher) | [`FRONT_DEG`] |
-//! | leaf hinged above (flap) | [`FRONT_DEG`] |
-//! | lid on a level face | [`LID_DEG`] |
-//! | drawer | [`DRAWER_SHARE`] of its carcass's depth |
-//! | leaf that slides along its face | its width less [`SLIDER_OVERLAP_M`] |
+//! | leaf on an upright hinge | `priors.ranges.door_deg` |
+//! | leaf hinged below (oven, dishwasher) | `priors.ranges.front_deg` |
+//! | leaf hinged above (flap) | `priors.ranges.front_deg` |
+//! | lid on a level face | `priors.ranges.lid_deg` |
+//! | drawer | `priors.ranges.drawer_share` of its carcass's depth |
+//! | leaf that slides along its face | its width less `priors.ranges.slider_overlap_m` |
 //!
 //! and never less than what was observed, nor further than the tray is long or the leaf wide. The limit is the largest
 //! opening up to there at which the part touches nothing while all else is closed: not its neighbours, nor its own carcass,
@@ -26,22 +26,11 @@ use crate::twin::{Furniture, OrientedBox, Part, Role, Solid};
 
 use super::overlap;
 
-/// A person opens a door until it is out of the way; hinges of cupboards stop between 95 and 120 degrees.
-const DOOR_DEG: f64 = 110.0;
-/// Fronts that come down or go up end level.
-const FRONT_DEG: f64 = 90.0;
-/// A lid leans back a little, so that it stays.
-const LID_DEG: f64 = 100.0;
-/// Runners keep a fifth of the drawer inside.
-const DRAWER_SHARE: f64 = 0.8;
-/// Of a sliding leaf this much stays behind the next one.
-const SLIDER_OVERLAP_M: f64 = 0.03;
-
 /// The ends of an observed motion are known to about this: radians for hinges, metres for slides.
 const OBSERVED_NOISE: [f64; 2] = [0.09, 0.03];
-/// Least limit, rad or m: a joint has a range; a hinge of less looks like half a turn whose degrees were read as radians.
+/// Format: least limit, rad or m; a joint has a range; a hinge of less looks like half a turn whose degrees were read as radians.
 const LEAST: [f64; 2] = [0.06, 0.01];
-/// Openings between two looks at what is in the way, rad or m.
+/// Numerics: openings between two looks at what is in the way, rad or m.
 const STEP: [f64; 2] = [1.0 / 180.0 * std::f64::consts::PI, 0.005];
 
 /// The one of two numbers that belongs to a kind of joint.
@@ -67,29 +56,38 @@ pub(super) fn comes_out(articulation: &Articulation, face: &Face) -> bool {
     articulation.kind == JointKind::Prismatic && articulation.axis.dot(&face.normal) > 0.9
 }
 
-/// The opening that a person would expect, rad or m: at least `observed`. `depth` is the carcass's; `most` is how far the
-/// part can go at all.
+/// What bounds how far a part opens.
+pub(super) struct Travel {
+    /// Largest opening that was observed, rad or m.
+    pub(super) observed: f64,
+    /// Of the carcass, metres.
+    pub(super) depth: f64,
+    /// How far the part can go at all, rad or m.
+    pub(super) most: f64,
+}
+
+/// The opening that a person would expect, rad or m: at least the observed one.
 pub(super) fn expected(
     articulation: &Articulation,
     face: &Face,
     up: &Vector,
-    observed: f64,
-    depth: f64,
-    most: f64,
+    travel: &Travel,
+    ranges: &config::Ranges,
 ) -> f64 {
+    let Travel { observed, depth, most } = *travel;
     let usual = match articulation.kind {
-        JointKind::Prismatic if comes_out(articulation, face) => DRAWER_SHARE * depth,
-        JointKind::Prismatic => most - SLIDER_OVERLAP_M,
-        JointKind::Revolute if articulation.axis.dot(up).abs() > 0.5 => DOOR_DEG.to_radians(),
-        JointKind::Revolute if face.is_horizontal(up) => LID_DEG.to_radians(),
-        JointKind::Revolute => FRONT_DEG.to_radians(),
+        JointKind::Prismatic if comes_out(articulation, face) => ranges.drawer_share * depth,
+        JointKind::Prismatic => most - ranges.slider_overlap_m,
+        JointKind::Revolute if articulation.axis.dot(up).abs() > 0.5 => ranges.door_deg.to_radians(),
+        JointKind::Revolute if face.is_horizontal(up) => ranges.lid_deg.to_radians(),
+        JointKind::Revolute => ranges.front_deg.to_radians(),
     };
     usual.max(observed).min(most).max(least(articulation.kind))
 }
 
 /// Openings from `from` to `to` (rad or m) that are at most `step` apart, both ends among them, with the part's motions.
 pub(super) fn motions(part: &Part, from: f64, to: f64, step: f64) -> Vec<(f64, Pose)> {
-    /// More poses tell nothing more.
+    /// Numerics: more poses tell nothing more.
     const MOST: f64 = 2000.0;
     let count = ((to - from).max(0.0) / step).ceil().clamp(1.0, MOST) as usize;
     (0..=count)
@@ -151,7 +149,7 @@ impl Bounds {
     }
 
     fn meets(&self, other: &Self) -> bool {
-        /// Between two poses a corner leaves the bounds of both by less.
+        /// Geometry: between two poses a corner leaves the bounds of both by less.
         const SLACK_M: f64 = 0.01;
         (0..3).all(|k| self.low[k] - SLACK_M <= other.high[k] && other.low[k] - SLACK_M <= self.high[k])
     }
@@ -163,7 +161,7 @@ fn closed(piece: &Furniture) -> impl Iterator<Item = OrientedBox> {
 }
 
 /// A leaf that slides along its face and would run into its neighbours' fronts runs before them, as sliding doors do.
-pub(super) fn before_neighbours(furniture: &mut [Furniture], config: &config::Fitting) {
+pub(super) fn before_neighbours(furniture: &mut [Furniture], boards: &config::Boards) {
     for i in 0..furniture.len() {
         let part = furniture[i].part.clone();
         let out: Vector = part.bounds.rotation.column(2).into_owned();
@@ -174,7 +172,7 @@ pub(super) fn before_neighbours(furniture: &mut [Furniture], config: &config::Fi
         let others: Vec<OrientedBox> =
             furniture.iter().enumerate().filter(|(j, _)| *j != i).flat_map(|(_, f)| closed(f)).collect();
         let free = |part: &Part| Way::of(part, 0.0, part.joint.observed).free(&others);
-        let moved = ahead(&part, &(out * (config.board_m + 2.0 * config.clearance_m)));
+        let moved = ahead(&part, &(out * (boards.thickness_m + 2.0 * boards.gap_m)));
         let clear = moved.solids.iter().all(|s| others.iter().all(|o| !overlap::boxes(&s.shape, o)));
         if clear && free(&moved) > free(&part) {
             furniture[i].part = moved;
@@ -254,11 +252,8 @@ pub(super) fn beyond_observed(furniture: &mut [Furniture], room: &[Solid]) {
 /// its middle) would never stay shut without one. A
 /// leaf that its weight shuts (flaps, lids) has one where a hand let go of it open and it stayed: `left_open` lists the
 /// openings, rad, at which that was seen.
-pub(super) fn balanced(part: &Part, up: &Vector, density: f64, left_open: &[f64]) -> bool {
-    /// Ajar: past the catch, radians.
-    const AJAR_RAD: f64 = 0.09;
-    /// A lever of gravity that friction does not hold, metres.
-    const LEVER_M: f64 = 0.005;
+pub(super) fn balanced(part: &Part, up: &Vector, density: f64, left_open: &[f64], config: &config::Fitting) -> bool {
+    let (ajar, least) = (config.ajar_rad, config.gravity_lever_m);
     let phi = part.joint.articulation;
     if phi.kind != JointKind::Revolute || phi.axis.dot(up).abs() > 0.5 {
         return false;
@@ -267,8 +262,8 @@ pub(super) fn balanced(part: &Part, up: &Vector, density: f64, left_open: &[f64]
     // Torque for each newton of weight; positive opens.
     let lever = |q: f64| phi.axis.dot(&(phi.motion(q) * mass.center - phi.origin).cross(&-up));
     part.opens_by_itself(up, density)
-        || lever(AJAR_RAD) > LEVER_M
-        || left_open.iter().any(|&q| q > 4.0 * AJAR_RAD && lever(q) < -LEVER_M)
+        || lever(ajar) > least
+        || left_open.iter().any(|&q| q > 4.0 * ajar && lever(q) < -least)
 }
 
 #[cfg(test)]
@@ -276,6 +271,8 @@ mod tests {
     use super::*;
     use crate::twin::Joint;
     use nalgebra::Matrix3;
+
+    const DOOR: f64 = 110.0;
 
     fn solid(role: Role, seen: bool, center: [f64; 3], half: [f64; 3]) -> Solid {
         let shape =
@@ -322,15 +319,15 @@ mod tests {
 
     #[test]
     fn a_door_seen_to_forty_degrees_opens_further_and_stops_before_the_wall() {
-        let door = piece(JointKind::Revolute, 0.7, DOOR_DEG.to_radians());
-        assert_eq!(limit(&mut [door.clone()], &[]), DOOR_DEG.to_radians());
+        let door = piece(JointKind::Revolute, 0.7, DOOR.to_radians());
+        assert_eq!(limit(&mut [door.clone()], &[]), DOOR.to_radians());
         // A wall across, 0.4 m before the front: the free edge meets it where 0.498 sin(q) is 0.4.
         let wall = solid(Role::Room, true, [0.0, -0.5, 0.5], [3.0, 0.1, 1.0]);
         let stop = limit(&mut [door.clone()], &[wall]);
         let meets = (0.4f64 / 0.498).asin();
         assert!(stop < meets && stop > meets - 4f64.to_radians(), "{stop} {meets}");
         // Where the recorded hand went the room does not stop it: there the room is carved.
-        let mut further = [piece(JointKind::Revolute, 1.4, DOOR_DEG.to_radians())];
+        let mut further = [piece(JointKind::Revolute, 1.4, DOOR.to_radians())];
         assert!(limit(&mut further, &[solid(Role::Room, true, [0.0, -0.5, 0.5], [3.0, 0.1, 1.0])]) >= 1.4);
     }
 
@@ -371,15 +368,17 @@ mod tests {
         let hinge = |axis: Vector| Articulation { kind: JointKind::Revolute, axis, origin: Point::new(0.0, 0.0, 0.4) };
         let slide = |axis: Vector| Articulation { kind: JointKind::Prismatic, axis, origin: Point::origin() };
         let turn = std::f64::consts::PI;
+        let ranges = config::Ranges::default();
         let degrees = |phi: Articulation, face: &Face, observed: f64| {
-            expected(&phi, face, &Vector::z(), observed, 0.5, turn).to_degrees()
+            expected(&phi, face, &Vector::z(), &Travel { observed, depth: 0.5, most: turn }, &ranges).to_degrees()
         };
-        assert!((degrees(hinge(Vector::z()), &front, 0.7) - DOOR_DEG).abs() < 1e-9);
+        assert!((degrees(hinge(Vector::z()), &front, 0.7) - DOOR).abs() < 1e-9);
         assert!((degrees(hinge(Vector::z()), &front, 2.2) - 2.2f64.to_degrees()).abs() < 1e-9);
-        assert!((degrees(hinge(Vector::x()), &front, 0.7) - FRONT_DEG).abs() < 1e-9);
-        assert!((degrees(hinge(Vector::x()), &lid, 0.7) - LID_DEG).abs() < 1e-9);
-        let metres =
-            |phi: Articulation, observed: f64, most: f64| expected(&phi, &front, &Vector::z(), observed, 0.5, most);
+        assert!((degrees(hinge(Vector::x()), &front, 0.7) - ranges.front_deg).abs() < 1e-9);
+        assert!((degrees(hinge(Vector::x()), &lid, 0.7) - ranges.lid_deg).abs() < 1e-9);
+        let metres = |phi: Articulation, observed: f64, most: f64| {
+            expected(&phi, &front, &Vector::z(), &Travel { observed, depth: 0.5, most }, &ranges)
+        };
         assert!((metres(slide(-Vector::y()), 0.2, 0.476) - 0.4).abs() < 1e-12);
         assert!((metres(slide(-Vector::y()), 0.6, 0.476) - 0.476).abs() < 1e-12);
         assert!((metres(slide(Vector::x()), 0.2, 0.6) - 0.57).abs() < 1e-12);
@@ -388,6 +387,9 @@ mod tests {
     #[test]
     fn what_its_weight_opens_is_balanced_and_a_flap_only_where_it_stayed() {
         let up = Vector::z();
+        let balanced = |part: &Part, up: &Vector, density: f64, left_open: &[f64]| {
+            balanced(part, up, density, left_open, &config::Fitting::default())
+        };
         let mut oven = piece(JointKind::Revolute, 1.0, 1.6).part;
         oven.joint.articulation =
             Articulation { kind: JointKind::Revolute, axis: Vector::x(), origin: Point::new(0.25, 0.0, 0.0) };

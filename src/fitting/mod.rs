@@ -2,36 +2,35 @@
 //! and what it resists with, and the room around it (ours).
 
 mod cells;
+mod cover;
+mod joint_front;
 pub mod joints;
 mod limits;
 pub mod overlap;
 mod placing;
+mod planes;
 mod resistance;
 mod room;
+mod turned;
 
 use nalgebra::Matrix3;
 
 use crate::articulation::{Articulation, JointKind};
-use crate::config;
-use crate::geometry::Face;
-use crate::geometry::Rect;
+use crate::config::{self, Priors};
+use crate::geometry::{Face, Rect, fronts};
 use crate::hands::Trajectory;
-use crate::math::{Vector, any_orthogonal, reject, unit};
+use crate::math::{Vector, reject, unit};
 use crate::pipeline::{Scene, SceneJoint};
 use crate::twin::{Furniture, Joint, LeftOut, OrientedBox, Part, Role, Solid, Twin};
 use placing::place;
+pub use room::{body, sweep};
 
-/// Height of a handle's bar over its face, metres; and half the width of bar and posts.
-const HANDLE_STANDOFF_M: f64 = 0.035;
-const HANDLE_HALF_M: f64 = 0.006;
-/// Half-length of a handle's bar.
-const HANDLE_BAR_HALF_M: f64 = 0.06;
-
-/// A direction nearer than this to upright or level is meant to be so, degrees.
-const LEVEL_DEG: f64 = 5.0;
-/// A leaf that hangs turns about a line this far behind its middle, so that its weight shuts it, metres. Its upper front
-/// corner then rises by half a board: the piece ends that much lower than its hinge was seen.
-const HUNG_M: f64 = 0.002;
+/// What a piece is built by.
+#[derive(Debug, Clone, Copy)]
+struct Rules<'a> {
+    config: &'a config::Fitting,
+    priors: &'a Priors,
+}
 
 /// A joint with its face and the rectangle of its part, ready to be built.
 #[derive(Debug, Clone)]
@@ -43,22 +42,31 @@ struct Plan<'a> {
     face: Face,
     rect: Rect,
     seen: bool,
+    /// Whether nothing of the furniture was seen, not even its front's plane ([`Scene::is_assumed`]).
+    assumed: bool,
     /// Against gravity, unit.
     up: Vector,
 }
 
 /// Builds the twin of a scene.
 #[must_use]
-pub fn fit(scene: &Scene, up: &Vector, config: &config::Fitting) -> Twin {
-    fit_joints(scene, &scene.joints, up, config)
+pub fn fit(scene: &Scene, up: &Vector, config: &config::Fitting, priors: &Priors) -> Twin {
+    fit_joints(scene, &scene.joints, up, config, priors)
 }
 
 /// The same with other joints in the place of the scene's own: what the twin would be under another hypothesis.
 #[must_use]
-pub fn fit_joints(scene: &Scene, joints: &[SceneJoint], up: &Vector, config: &config::Fitting) -> Twin {
-    let mut plans: Vec<Plan> = joints.iter().map(|j| plan(j, up, config)).collect();
+pub fn fit_joints(
+    scene: &Scene,
+    joints: &[SceneJoint],
+    up: &Vector,
+    config: &config::Fitting,
+    priors: &Priors,
+) -> Twin {
+    let rules = Rules { config, priors };
+    let mut plans: Vec<Plan> = joints.iter().map(|j| plan(j, scene.is_assumed(j), up, rules)).collect();
     let mut rects: Vec<(Face, Rect)> = plans.iter().map(|p| (p.face, p.rect)).collect();
-    overlap::separate(&mut rects, config);
+    overlap::separate(&mut rects, &priors.boards);
     for (plan, (_, rect)) in plans.iter_mut().zip(rects) {
         plan.rect = rect;
     }
@@ -73,7 +81,7 @@ pub fn fit_joints(scene: &Scene, joints: &[SceneJoint], up: &Vector, config: &co
     let mut placed: Vec<(usize, Furniture)> = Vec::new();
     let mut left_out = Vec::new();
     for i in order {
-        match place(&plans[i], &placed, config) {
+        match place(&plans[i], &placed, rules) {
             Ok(furniture) => placed.push((i, furniture)),
             Err(why) => left_out.push(LeftOut {
                 id: plans[i].joint.id.clone(),
@@ -89,7 +97,7 @@ pub fn fit_joints(scene: &Scene, joints: &[SceneJoint], up: &Vector, config: &co
     let mut furniture: Vec<Furniture> = ranked.into_iter().map(|(.., f)| f).collect();
 
     // The room leaves free where parts were seen to go, and limits what nobody saw.
-    limits::before_neighbours(&mut furniture, config);
+    limits::before_neighbours(&mut furniture, &priors.boards);
     // A part that its neighbours hold shut is wrong about where it is: it goes, and what it held is free.
     while let Some(&worst) = limits::within_observed(&mut furniture, &ranks).iter().max_by_key(|&&i| ranks[i]) {
         left_out.push(LeftOut {
@@ -105,7 +113,7 @@ pub fn fit_joints(scene: &Scene, joints: &[SceneJoint], up: &Vector, config: &co
     room.retain(|solid| solid.check().is_ok());
     limits::beyond_observed(&mut furniture, &room);
     for (piece, joint) in furniture.iter_mut().zip(joints) {
-        resist(&mut piece.part, &hands(scene, joint), up, config);
+        resist(&mut piece.part, &hands(scene, joint), up, rules);
     }
     // Whatever a step made of a piece: one that no simulator would load costs itself.
     furniture.retain(|piece| match piece.check() {
@@ -115,7 +123,13 @@ pub fn fit_joints(scene: &Scene, joints: &[SceneJoint], up: &Vector, config: &co
             false
         }
     });
-    Twin { name: scene.recording.clone(), density_kg_per_m3: config.density_kg_per_m3, furniture, room, left_out }
+    Twin {
+        name: scene.recording.clone(),
+        density_kg_per_m3: priors.boards.density_kg_per_m3,
+        furniture,
+        room,
+        left_out,
+    }
 }
 
 /// The hands of a joint's clips, in the order of time.
@@ -133,41 +147,60 @@ fn hands<'a>(scene: &'a Scene, joint: &SceneJoint) -> Vec<&'a Trajectory> {
 }
 
 /// Damping, friction and whether a spring carries the weight, as far as the hands show them.
-fn resist(part: &mut Part, hands: &[&Trajectory], up: &Vector, config: &config::Fitting) {
-    let density = config.density_kg_per_m3;
-    let left = resistance::left_open(&part.joint.articulation, hands);
+fn resist(part: &mut Part, hands: &[&Trajectory], up: &Vector, rules: Rules) {
+    let density = rules.priors.boards.density_kg_per_m3;
+    let config = rules.config;
+    let left = resistance::left_open(&part.joint.articulation, hands, &config.coast);
     let table = [part.joint.damping, part.joint.friction];
-    if let Some([damping, friction]) = resistance::seen(part, &left, table, up, density) {
+    if let Some([damping, friction]) = resistance::seen(part, &left, table, up, density, &config.coast) {
         part.joint.damping = damping;
         part.joint.friction = friction;
         part.joint.resistance_seen = true;
     }
     // Left open is what hangs about where the hand let go of it.
-    let stayed: Vec<f64> = left.iter().filter(|l| l.found >= 0.5 * l.released).map(|l| l.found).collect();
-    part.joint.balanced = limits::balanced(part, up, density, &stayed);
+    let stayed: Vec<f64> =
+        left.iter().filter(|l| l.found >= config.coast.stayed_share * l.released).map(|l| l.found).collect();
+    part.joint.balanced = limits::balanced(part, up, density, &stayed, config);
 }
 
 /// Face, rectangle and the joint moved onto them.
-fn plan<'a>(joint: &'a SceneJoint, up: &Vector, config: &config::Fitting) -> Plan<'a> {
-    let seen_face = joint.face.filter(|f| is_front_of(f, joint, up)).unwrap_or_else(|| assumed_face(joint, up));
-    let face = levelled(&seen_face, up);
+fn plan<'a>(joint: &'a SceneJoint, assumed: bool, up: &Vector, rules: Rules) -> Plan<'a> {
+    let Rules { config, priors } = rules;
+    let config::Boards { thickness_m, gap_m, .. } = priors.boards;
+    let can_be = |f: &Face| !f.is_assumed() || fronts::may_be_front(f, &joint.joint, &joint.grip);
+    let seen_face = joint
+        .face
+        .filter(|f| is_front_of(f, joint, up) && can_be(f))
+        .unwrap_or_else(|| fronts::of_joint(&joint.joint, &joint.grip, up, priors.handles.standoff_m));
+    let face = levelled(&seen_face, up, config.level_deg);
     let mut articulation = joint.joint;
-    articulation.axis = squared(&articulation.axis, &face, up);
+    articulation.axis = squared(&articulation.axis, &face, up, config.level_deg);
     if articulation.kind == JointKind::Revolute {
         let [r, u, h] = seen_face.coordinates(&articulation.origin);
         let level = articulation.axis.dot(&face.up).abs() < articulation.axis.dot(&face.right).abs();
         let (u, h) = if level && u > 0.0 && !face.is_horizontal(up) {
-            (u - 0.5 * config.board_m - config.clearance_m, -0.5 * config.board_m - HUNG_M)
+            (u - 0.5 * thickness_m - gap_m, -0.5 * thickness_m - config.hung_m)
         } else {
             // The hinge runs along the front edge of the leaf or just before it: about an axis behind it the leaf's edge
             // would swing into its neighbour.
-            (u, h.clamp(0.0, config.board_m))
+            (u, h.clamp(0.0, thickness_m))
         };
         articulation.origin = face.point(r, u, h);
     }
-    let (rect, seen) = rectangle(joint, &articulation, &face);
+    let usual = assumed.then(|| usual_bounds(&articulation, &face, &priors.fronts));
+    let (rect, seen) = rectangle(joint, &articulation, &face, usual, rules);
     let observed = joint.observed_range;
-    Plan { joint, observed, articulation, face, rect, seen, up: *up }
+    Plan { joint, observed, articulation, face, rect, seen, assumed, up: *up }
+}
+
+/// The bounds of a front of which only the hand was seen, about the grip: of a usual size. A hinge sets its own side later.
+fn usual_bounds(articulation: &Articulation, face: &Face, fronts: &config::Fronts) -> [[f64; 2]; 2] {
+    let wide = 0.5 * fronts.assumed_width_m;
+    let high = match limits::comes_out(articulation, face) {
+        true => 0.5 * fronts.assumed_drawer_m,
+        false => 0.5 * fronts.assumed_door_m,
+    };
+    [[-wide, wide], [-high, high]]
 }
 
 /// Whether a face can be the front of what moves: a drawer is not pulled along a lid or a worktop.
@@ -177,9 +210,9 @@ fn is_front_of(face: &Face, joint: &SceneJoint, up: &Vector) -> bool {
 
 /// A direction made upright or level where it nearly is: gravity opens a door whose hinge leans by a thousandth of a radian,
 /// where a simulator has no friction to hold it.
-fn plumb(direction: &Vector, up: &Vector) -> Vector {
+fn plumb(direction: &Vector, up: &Vector, within_deg: f64) -> Vector {
     let along = direction.dot(up);
-    let near = LEVEL_DEG.to_radians();
+    let near = within_deg.to_radians();
     if along.abs() > near.cos() {
         *up * along.signum()
     } else if along.abs() < near.sin() {
@@ -190,74 +223,61 @@ fn plumb(direction: &Vector, up: &Vector) -> Vector {
 }
 
 /// A face with its own axes plumb, turned about its centre.
-fn levelled(face: &Face, up: &Vector) -> Face {
-    let normal = plumb(&face.normal, up);
-    match unit(&reject(&plumb(&face.up, up), &normal)) {
+fn levelled(face: &Face, up: &Vector, within_deg: f64) -> Face {
+    let normal = plumb(&face.normal, up, within_deg);
+    match unit(&reject(&plumb(&face.up, up, within_deg), &normal)) {
         Some(face_up) => Face { right: face_up.cross(&normal), up: face_up, normal, ..*face },
         None => *face,
     }
 }
 
 /// A joint's axis: the direction of the face that it nearly has, else itself made plumb.
-fn squared(axis: &Vector, face: &Face, up: &Vector) -> Vector {
-    let near = LEVEL_DEG.to_radians().cos();
+fn squared(axis: &Vector, face: &Face, up: &Vector, within_deg: f64) -> Vector {
+    let near = within_deg.to_radians().cos();
     [face.right, face.up, face.normal]
         .into_iter()
         .flat_map(|d| [d, -d])
         .find(|d| d.dot(axis) > near)
-        .unwrap_or_else(|| plumb(axis, up))
+        .unwrap_or_else(|| plumb(axis, up, within_deg))
 }
 
-/// Without a face in the images the motion of the grip tells which way the front looks.
-fn assumed_face(joint: &SceneJoint, up: &Vector) -> Face {
-    let normal = match joint.joint.kind {
-        JointKind::Prismatic => joint.joint.axis,
-        JointKind::Revolute => unit(&joint.joint.axis.cross(&(joint.grip - joint.joint.origin)))
-            .unwrap_or_else(|| any_orthogonal(&joint.joint.axis)),
-    };
-    let face_up = unit(&reject(up, &normal)).unwrap_or_else(|| any_orthogonal(&normal));
-    Face {
-        center: joint.grip - normal * HANDLE_STANDOFF_M,
-        right: face_up.cross(&normal),
-        up: face_up,
-        normal,
-        extent: [[-0.3, 0.3]; 2],
-        support: 0.0,
-    }
-}
-
-/// The part's rectangle: what was seen to move, brought to the hinge; else what the grip and the hinge suggest.
-fn rectangle(joint: &SceneJoint, articulation: &Articulation, face: &Face) -> (Rect, bool) {
-    // Handles stand a few centimetres from the free edge.
-    const RIM_M: f64 = 0.05;
-    const MIN_M: f64 = 0.1;
+/// The part's rectangle: what was seen to move, brought to the hinge; else what the grip and the hinge suggest, from `usual` bounds
+/// where the face is assumed.
+fn rectangle(
+    joint: &SceneJoint,
+    articulation: &Articulation,
+    face: &Face,
+    usual: Option<[[f64; 2]; 2]>,
+    rules: Rules,
+) -> (Rect, bool) {
+    let least_m = rules.config.least_front_m;
+    let around_m = rules.config.around_grip_m;
+    let rim_m = rules.priors.handles.from_edge_m;
     let seen = joint.part.is_some();
-    let mut bounds = joint.part.map_or_else(
-        || {
-            let [r, u] = face.extent;
-            // The extent may be a whole row of furniture: a part is no wider than 0.6 m and no taller than the row.
-            [[r[0].max(-0.3), r[1].min(0.3)], [u[0].max(-0.35), u[1].min(0.35)]]
-        },
-        |r| r.bounds,
-    );
+    let mut bounds = joint.part.map(|r| r.bounds).or(usual).unwrap_or_else(|| {
+        let [r, u] = face.extent;
+        // The extent may be a whole row of furniture: a part is no wider than one front and no taller than the row.
+        let [wide, high] = rules.config.most_half_m;
+        [[r[0].max(-wide), r[1].min(wide)], [u[0].max(-high), u[1].min(high)]]
+    });
     if articulation.kind == JointKind::Revolute {
         let [r, u, _] = face.coordinates(&articulation.origin);
         let upright = articulation.axis.dot(&face.up).abs() >= articulation.axis.dot(&face.right).abs();
         let (axis, at) = if upright { (0, r) } else { (1, u) };
         // The hinge is one edge of the leaf, the grip is near the other.
         if at < 0.0 {
-            bounds[axis] = [at, if seen { bounds[axis][1].max(at + MIN_M) } else { RIM_M }];
+            bounds[axis] = [at, if seen { bounds[axis][1].max(at + least_m) } else { rim_m }];
         } else {
-            bounds[axis] = [if seen { bounds[axis][0].min(at - MIN_M) } else { -RIM_M }, at];
+            bounds[axis] = [if seen { bounds[axis][0].min(at - least_m) } else { -rim_m }, at];
         }
     }
     for b in &mut bounds {
         // The handle is on the part.
-        b[0] = b[0].min(-0.02);
-        b[1] = b[1].max(0.02);
-        if b[1] - b[0] < MIN_M {
+        b[0] = b[0].min(-around_m);
+        b[1] = b[1].max(around_m);
+        if b[1] - b[0] < least_m {
             let middle = 0.5 * (b[0] + b[1]);
-            *b = [middle - 0.5 * MIN_M, middle + 0.5 * MIN_M];
+            *b = [middle - 0.5 * least_m, middle + 0.5 * least_m];
         }
     }
     (Rect { bounds }, seen)
@@ -273,11 +293,12 @@ fn face_box(face: &Face, bounds: [[f64; 2]; 3]) -> OrientedBox {
     }
 }
 
-fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
+fn build(plan: &Plan, depth: f64, rules: Rules) -> Furniture {
     let face = &plan.face;
     let id = &plan.joint.id;
-    let gap = config.clearance_m;
-    let board = config.board_m;
+    let Rules { config, priors } = rules;
+    let gap = priors.boards.gap_m;
+    let board = priors.boards.thickness_m;
     let [r, u] = plan.rect.bounds;
     let inset = 0.5 * gap;
     let (front_r, front_u) = ([r[0] + inset, r[1] - inset], [u[0] + inset, u[1] - inset]);
@@ -288,7 +309,7 @@ fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
         seen,
     };
     let mut solids = vec![solid("front", Role::Front, [front_r, front_u, [-board, 0.0]], plan.seen)];
-    solids.extend(handle(plan, front_r, front_u, &solid));
+    solids.extend(handle(plan, [front_r, front_u], rules, &solid));
 
     let carcass_out = [-depth, -board - gap];
     let slide = plan.articulation.kind == JointKind::Prismatic;
@@ -299,10 +320,12 @@ fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
         let tray = [-(depth - board - 2.0 * gap), -board];
         let inner_r = [r[0] + board + 2.0 * gap, r[1] - board - 2.0 * gap];
         // A tray's walls are lower than its front.
-        let inner_u =
-            [u[0] + board + 2.0 * gap, u[0] + board + 2.0 * gap + 0.7 * (u[1] - u[0] - 2.0 * board - 4.0 * gap)];
+        let inner_u = {
+            let (low, free) = (u[0] + board + 2.0 * gap, u[1] - u[0] - 2.0 * board - 4.0 * gap);
+            [low, low + priors.boards.tray_height_share * free]
+        };
         if inner_r[1] - inner_r[0] > 4.0 * board && inner_u[1] - inner_u[0] > 2.0 * board {
-            let thin = 0.012;
+            let thin = priors.boards.tray_thickness_m;
             solids.push(solid("tray_left", Role::Tray, [[inner_r[0], inner_r[0] + thin], inner_u, tray], false));
             solids.push(solid("tray_right", Role::Tray, [[inner_r[1] - thin, inner_r[1]], inner_u, tray], false));
             let between = [inner_r[0] + thin, inner_r[1] - thin];
@@ -326,12 +349,12 @@ fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
         solid("carcass_top", Role::Carcass, [between_r, [u[1] - board, u[1]], carcass_out], false),
         solid("carcass_back", Role::Carcass, [between_r, between_u, [deep, deep + board]], false),
     ];
-    carcass.retain(|s| s.shape.half.iter().all(|h| *h > 1e-3));
+    carcass.retain(|s| s.shape.half.iter().all(|h| *h > config.least_board_half_m));
 
     let (damping, friction) = if slide {
-        (config.slide_damping, config.slide_friction)
+        (priors.resistance.slide_damping, priors.resistance.slide_friction)
     } else {
-        (config.hinge_damping, config.hinge_friction)
+        (priors.resistance.hinge_damping, priors.resistance.hinge_friction)
     };
     let bounds = bounds_of(&solids, face);
     let mut articulation = plan.articulation;
@@ -340,6 +363,7 @@ fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
         JointKind::Prismatic => bounds.center,
     };
     let handle = solids.iter().find(|s| s.role == Role::Handle).map_or(plan.joint.grip, |s| s.shape.center);
+    let travel = limits::Travel { observed: plan.observed, depth, most };
     // What nobody named.
     let word = plan.joint.furniture.as_deref().unwrap_or(match articulation.kind {
         JointKind::Revolute => "door",
@@ -356,7 +380,7 @@ fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
                 articulation,
                 upper: plan.observed.min(most).max(limits::least(plan.articulation.kind)),
                 observed: plan.observed,
-                expected: limits::expected(&plan.articulation, face, &plan.up, plan.observed, depth, most),
+                expected: limits::expected(&plan.articulation, face, &plan.up, &travel, &priors.ranges),
                 damping,
                 friction,
                 resistance_seen: false,
@@ -373,17 +397,17 @@ fn build(plan: &Plan, depth: f64, config: &config::Fitting) -> Furniture {
 /// A bar on two posts where the hand was; upright beside an upright hinge, level otherwise.
 fn handle(
     plan: &Plan,
-    front_r: [f64; 2],
-    front_u: [f64; 2],
+    bounds: [[f64; 2]; 2],
+    rules: Rules,
     solid: &impl Fn(&str, Role, [[f64; 2]; 3], bool) -> Solid,
 ) -> Vec<Solid> {
     let upright = plan.articulation.kind == JointKind::Revolute
         && plan.articulation.axis.dot(&plan.face.up).abs() > plan.articulation.axis.dot(&plan.face.right).abs();
     let along = usize::from(upright);
-    let bounds = [front_r, front_u];
+    let config::Handles { standoff_m, bar_half_width_m: half_m, bar_half_length_m, .. } = rules.priors.handles;
     let half: [f64; 2] = std::array::from_fn(|i| {
-        let wanted = if i == along { HANDLE_BAR_HALF_M } else { HANDLE_HALF_M };
-        wanted.min(0.4 * (bounds[i][1] - bounds[i][0]))
+        let wanted = if i == along { bar_half_length_m } else { half_m };
+        wanted.min(rules.config.bar_most_share * (bounds[i][1] - bounds[i][0]))
     });
     // The grip is the face's origin; the whole bar stays on the front.
     let center: [f64; 2] = std::array::from_fn(|i| {
@@ -391,12 +415,14 @@ fn handle(
         if low <= high { 0f64.clamp(low, high) } else { 0.5 * (low + high) }
     });
     let span = |i: usize| [center[i] - half[i], center[i] + half[i]];
-    let bar_out = [HANDLE_STANDOFF_M - HANDLE_HALF_M, HANDLE_STANDOFF_M + HANDLE_HALF_M];
-    let mut solids = vec![solid("handle_bar", Role::Handle, [span(0), span(1), bar_out], true)];
+    let bar_out = [standoff_m - half_m, standoff_m + half_m];
+    // Where the hand was a handle is; how it stands off a front that nobody saw is assumed as the front is.
+    let bar_seen = !plan.assumed;
+    let mut solids = vec![solid("handle_bar", Role::Handle, [span(0), span(1), bar_out], bar_seen)];
     for (name, end) in [("handle_post_a", -1.0), ("handle_post_b", 1.0)] {
         let mut post = [span(0), span(1), [0.0, bar_out[0]]];
-        let at = center[along] + end * (half[along] - HANDLE_HALF_M);
-        post[along] = [at - HANDLE_HALF_M, at + HANDLE_HALF_M];
+        let at = center[along] + end * (half[along] - half_m);
+        post[along] = [at - half_m, at + half_m];
         solids.push(solid(name, Role::Handle, post, false));
     }
     solids
@@ -455,11 +481,12 @@ mod tests {
             recording: "r".to_owned(),
             manhattan: None,
             depth_factors: Default::default(),
+            videos: Default::default(),
             clips: vec![],
             joints,
             surroundings: None,
         };
-        fit(&scene, &Vector::z(), &config::Fitting::default())
+        fit(&scene, &Vector::z(), &config::Fitting::default(), &Priors::default())
     }
 
     #[test]

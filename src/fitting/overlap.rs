@@ -9,7 +9,7 @@ use crate::geometry::Face;
 use crate::geometry::Rect;
 use crate::twin::{Furniture, OrientedBox};
 
-/// Overlap below this is contact, not shared space, metres.
+/// Numerics: overlap below this is contact, not shared space, metres; single precision tells no less.
 const CONTACT_M: f64 = 1e-4;
 
 /// Whether two boxes share space.
@@ -40,9 +40,9 @@ pub fn furniture(a: &Furniture, b: &Furniture) -> bool {
 }
 
 /// Cuts rectangles of one plane that overlap at the middle of the overlap, across its narrower direction.
-pub fn separate(rects: &mut [(Face, Rect)], config: &config::Fitting) {
+pub fn separate(rects: &mut [(Face, Rect)], boards: &config::Boards) {
     // Faces of one front: parallel within 10 degrees and within a few boards of one plane.
-    let plane_m = 3.0 * config.board_m;
+    let plane_m = 3.0 * boards.thickness_m;
     for i in 0..rects.len() {
         for j in 0..i {
             let (a, b) = (rects[i], rects[j]);
@@ -98,7 +98,7 @@ mod tests {
             (face(0.0), Rect { bounds: [[-0.3, 0.3], [-0.2, 0.2]] }),
             (face(0.5), Rect { bounds: [[-0.24, 0.3], [-0.2, 0.2]] }),
         ];
-        separate(&mut rects, &config::Fitting::default());
+        separate(&mut rects, &config::Boards::default());
         assert!((rects[0].1.bounds[0][1] - 0.28).abs() < 1e-12);
         assert!((rects[1].1.bounds[0][0] + 0.22).abs() < 1e-12);
         assert_eq!(rects[0].1.bounds[1], [-0.2, 0.2]);
@@ -116,7 +116,7 @@ mod tests {
         };
         let mut rects =
             [(face, Rect { bounds: [[-0.3, 0.3], [-0.4, 0.4]] }), (face, Rect { bounds: [[-0.3, 0.3], [0.04, 0.2]] })];
-        separate(&mut rects, &config::Fitting::default());
+        separate(&mut rects, &config::Boards::default());
         assert_eq!(rects[1].1.bounds[1], [0.04, 0.2]);
         assert_eq!(rects[0].1.bounds[1], [-0.4, 0.04]);
     }

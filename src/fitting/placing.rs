@@ -1,8 +1,7 @@
 //! Where a piece of furniture fits among those that stand already.
 
-use super::{Plan, build, overlap};
+use super::{Plan, Rules, build, overlap};
 use crate::articulation::JointKind;
-use crate::config;
 use crate::geometry::Rect;
 use crate::twin::{Furniture, Role, Solid};
 
@@ -29,10 +28,11 @@ impl Unplaced {
 pub(super) fn place(
     plan: &Plan,
     placed: &[(usize, Furniture)],
-    config: &config::Fitting,
+    rules: Rules,
 ) -> std::result::Result<Furniture, Unplaced> {
-    const DEPTH_STEP_M: f64 = 0.05;
-    let sides = plan.rect.bounds.map(|[low, high]| high - low - config.clearance_m);
+    let (config, boards) = (rules.config, &rules.priors.boards);
+    let (deep, step_m) = (boards.carcass_depth_m, config.depth_step_m);
+    let sides = plan.rect.bounds.map(|[low, high]| high - low - boards.gap_m);
     if sides.iter().any(|side| side.is_nan() || *side <= 0.0) {
         return Err(Unplaced::Broken("nothing of its front is left beside other parts at the same place".to_owned()));
     }
@@ -49,16 +49,16 @@ pub(super) fn place(
             false
         }
     };
-    for share in [1.0, 0.85, 0.7] {
+    for share in config.front_shares {
         let plan = Plan { rect: shrunk(plan, share), ..plan.clone() };
-        let steps = ((config.carcass_depth_m - 0.1) / DEPTH_STEP_M).ceil().max(1.0) as usize;
+        let steps = ((deep - config.least_depth_m) / step_m).ceil().max(1.0) as usize;
         for step in 0..steps {
-            let piece = build(&plan, config.carcass_depth_m - step as f64 * DEPTH_STEP_M, config);
+            let piece = build(&plan, deep - step as f64 * step_m, rules);
             if stands(&piece) {
                 return Ok(piece);
             }
         }
-        let mut piece = build(&plan, config.carcass_depth_m, config);
+        let mut piece = build(&plan, deep, rules);
         let blocked = |s: &Solid| placed.iter().any(|(_, other)| overlap::with(other, &s.shape));
         piece.carcass.retain(|s| !blocked(s));
         piece.part.solids.retain(|s| s.role != Role::Tray || !blocked(s));

@@ -13,21 +13,11 @@
 //! what is in the furniture), and so the result is worth a factor of two, not digits.
 
 use crate::articulation::{Action, Articulation, JointKind};
+use crate::config;
 use crate::hands::Trajectory;
 use crate::inference;
 use crate::math::{Vector, stats};
 use crate::twin::{Part, mass_properties};
-
-/// Speed at release is the slope over this time.
-const WINDOW_SECS: f64 = 0.3;
-/// A hand is known to a few centimetres: over the window that is a speed of up to this, m/s at the handle.
-const LEAST_SPEED_M_PER_S: f64 = 0.3;
-/// Hands of two clips differ by a few centimetres: a coast must be clearly longer, metres at the handle.
-const LEAST_COAST_M: f64 = 0.15;
-/// A part this near to its limit may have run into it, metres at the handle.
-const STOP_M: f64 = 0.05;
-/// Further from the table than this factor is no furniture but something that was not seen: a hand, a knock, a third clip.
-const PLAUSIBLE: f64 = 5.0;
 
 /// A part that a hand left open, and the next hand found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,7 +31,7 @@ pub(super) struct Left {
 }
 
 /// Openings that are each followed by a closing of the same joint. `clips` in the order of time.
-pub(super) fn left_open(joint: &Articulation, clips: &[&Trajectory]) -> Vec<Left> {
+pub(super) fn left_open(joint: &Articulation, clips: &[&Trajectory], rules: &config::Coast) -> Vec<Left> {
     let pair = |opened: &Trajectory, closed: &Trajectory| {
         if opened.action != Action::Open || closed.action != Action::Close {
             return None;
@@ -54,7 +44,7 @@ pub(super) fn left_open(joint: &Articulation, clips: &[&Trajectory]) -> Vec<Left
             .iter()
             .zip(&openings)
             .map(|(s, q)| [s.time_secs - end, *q])
-            .filter(|[t, _]| *t >= -WINDOW_SECS)
+            .filter(|[t, _]| *t >= -rules.window_secs)
             .collect();
         let (released, speed) = line_at_zero(&last)?;
         Some(Left { speed, released, found: joint.opening_at(&grip, &closed.open_grip()) })
@@ -78,18 +68,23 @@ fn line_at_zero(samples: &[[f64; 2]]) -> Option<(f64, f64)> {
 
 /// Damping and friction that the coasts of a part show, with the ratio of the `table`'s (damping, friction); `None` where
 /// none is told clearly, or where gravity moves the part too.
-pub(super) fn seen(part: &Part, left: &[Left], table: [f64; 2], up: &Vector, density: f64) -> Option<[f64; 2]> {
-    /// Level or upright to this: a slide that leans by more runs by itself, radians.
-    const LEVEL_RAD: f64 = 0.05;
+pub(super) fn seen(
+    part: &Part,
+    left: &[Left],
+    table: [f64; 2],
+    up: &Vector,
+    density: f64,
+    rules: &config::Coast,
+) -> Option<[f64; 2]> {
     let phi = part.joint.articulation;
     let mass = mass_properties(&part.solids, density)?;
     let along = phi.axis.dot(up).abs();
     let (inertia, lever, weightless) = match phi.kind {
-        JointKind::Prismatic => (mass.mass, 1.0, along < LEVEL_RAD.sin()),
+        JointKind::Prismatic => (mass.mass, 1.0, along < rules.level_rad.sin()),
         JointKind::Revolute => {
             let line = phi.line();
             let about = phi.axis.dot(&(mass.inertia * phi.axis)) + mass.mass * line.distance(&mass.center).powi(2);
-            (about, line.distance(&part.handle), along > LEVEL_RAD.cos())
+            (about, line.distance(&part.handle), along > rules.level_rad.cos())
         }
     };
     if !weightless {
@@ -98,9 +93,9 @@ pub(super) fn seen(part: &Part, left: &[Left], table: [f64; 2], up: &Vector, den
     let [damping, friction] = table;
     let ratio = friction / damping;
     let told = |l: &&Left| {
-        l.speed * lever >= LEAST_SPEED_M_PER_S
-            && (l.found - l.released) * lever >= LEAST_COAST_M
-            && (part.joint.upper - l.found) * lever >= STOP_M
+        l.speed * lever >= rules.least_speed_m_per_s
+            && (l.found - l.released) * lever >= rules.least_coast_m
+            && (part.joint.upper - l.found) * lever >= rules.stop_m
     };
     let dampings: Vec<f64> = left
         .iter()
@@ -108,7 +103,7 @@ pub(super) fn seen(part: &Part, left: &[Left], table: [f64; 2], up: &Vector, den
         .map(|l| inertia * (l.speed - ratio * (l.speed / ratio).ln_1p()) / (l.found - l.released))
         .collect();
     let found = stats::median(&dampings)?;
-    let plausible = (damping / PLAUSIBLE..=damping * PLAUSIBLE).contains(&found);
+    let plausible = (damping / rules.plausible..=damping * rules.plausible).contains(&found);
     plausible.then_some([found, found * ratio])
 }
 
@@ -181,9 +176,9 @@ mod tests {
         let later: Vec<f64> = times.iter().map(|t| t + 5.0).collect();
         // Four samples at rest before the hand moves it.
         let closed = hand(&part, Action::Close, &later, |t| found * (1.0 - ((t - 5.2) / 0.8).max(0.0)));
-        let left = left_open(&part.joint.articulation, &[&opened, &closed]);
+        let left = left_open(&part.joint.articulation, &[&opened, &closed], &config::Coast::default());
         assert_eq!(left.len(), 1);
-        seen(&part, &left, [0.5, 0.2], &Vector::z(), 700.0)
+        seen(&part, &left, [0.5, 0.2], &Vector::z(), 700.0, &config::Coast::default())
     }
 
     #[test]
@@ -202,13 +197,13 @@ mod tests {
         assert_eq!(shown(0.5, 0.2, 0.2), None);
         let part = door();
         let still = Left { speed: 1.0, released: 0.8, found: 0.82 };
-        assert_eq!(seen(&part, &[still], [0.5, 0.2], &Vector::z(), 700.0), None);
+        assert_eq!(seen(&part, &[still], [0.5, 0.2], &Vector::z(), 700.0, &config::Coast::default()), None);
         // Found at its stop.
         let stopped = Left { speed: 1.0, released: 0.8, found: 1.88 };
-        assert_eq!(seen(&part, &[stopped], [0.5, 0.2], &Vector::z(), 700.0), None);
+        assert_eq!(seen(&part, &[stopped], [0.5, 0.2], &Vector::z(), 700.0, &config::Coast::default()), None);
         // A level hinge: gravity has its share.
         let coasted = Left { speed: 1.0, released: 0.8, found: 1.3 };
-        assert!(seen(&part, &[coasted], [0.5, 0.2], &Vector::z(), 700.0).is_some());
-        assert_eq!(seen(&part, &[coasted], [0.5, 0.2], &Vector::x(), 700.0), None);
+        assert!(seen(&part, &[coasted], [0.5, 0.2], &Vector::z(), 700.0, &config::Coast::default()).is_some());
+        assert_eq!(seen(&part, &[coasted], [0.5, 0.2], &Vector::x(), 700.0, &config::Coast::default()), None);
     }
 }

@@ -1,86 +1,29 @@
-//! The rest of the room as boxes that do not move: floor, walls, worktops, furniture that nobody opened (ours).
+//! The rest of the room as few boxes that do not move: floor, walls, worktops, furniture that nobody opened (ours).
 //!
-//! Cells that several views saw ([`crate::pipeline::RoomCells`]) are set onto the room's flat surfaces, emptied where
-//! furniture stands or a part moves, and joined into boxes. The floor and the walls become one box each.
+//! Cells that several views saw ([`crate::pipeline::RoomCells`]) are set onto the room's flat surfaces (`planes.rs`). The floor
+//! and the walls become one box each; what is left is covered by boxes that are as large as what was seen through lets them be
+//! (`cover.rs`). None is where furniture stands or a part moves.
 
 use std::collections::{BTreeMap, HashSet};
 
-use nalgebra::Matrix3;
-
-use super::cells::{Extent, Index, drop_specks, joined};
-use super::{limits, overlap};
+use super::cells::{Block, Extent, Index, Known, drop_specks, within};
+use super::planes::{Grid, Plane, around, flattened};
+use super::{cover, limits, overlap, turned};
 use crate::articulation::JointKind;
 use crate::config;
-use crate::math::{Point, Vector, stats};
+use crate::math::{Vector, stats};
 use crate::pipeline::RoomCells;
 use crate::twin::{Furniture, OrientedBox, Part, Role, Solid};
 
-/// Free space kept around a part on its way, metres.
-const MARGIN_M: f64 = 0.02;
-/// From one pose of a part to the next no corner of it goes further, metres: half of it stays within the margin.
-const TRAVEL_M: f64 = 0.02;
-/// Half the thickness of a flat surface that is not a floor or a wall, metres.
-const SHEET_M: f64 = 0.01;
-/// Thickness of floor and walls, metres.
-const WALL_M: f64 = 0.05;
-
-/// Axes and edge of the cells.
-#[derive(Debug, Clone, Copy)]
-struct Grid {
-    axes: [Vector; 3],
-    edge: f64,
-}
-
-impl Grid {
-    fn coordinates(&self, p: &Point) -> [f64; 3] {
-        self.axes.map(|a| a.dot(&p.coords))
-    }
-
-    /// Middle of a cell's layer along an axis.
-    fn middle(&self, layer: i32) -> f64 {
-        (f64::from(layer) + 0.5) * self.edge
-    }
-
-    fn shape(&self, extent: &Extent) -> OrientedBox {
-        let middle = extent.map(|[low, high]| 0.5 * (low + high));
-        let center = self.axes.iter().zip(middle).fold(Vector::zeros(), |sum, (axis, c)| sum + axis * c);
-        OrientedBox {
-            center: Point::from(center),
-            half: Vector::from(extent.map(|[low, high]| 0.5 * (high - low))),
-            rotation: Matrix3::from_columns(&self.axes),
-        }
-    }
-
-    /// Bounds of points along the grid's axes; empty (low above high) for no points.
-    fn bounds(&self, points: impl IntoIterator<Item = Point>) -> Extent {
-        let mut bounds = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
-        for p in points {
-            for (b, c) in bounds.iter_mut().zip(self.coordinates(&p)) {
-                *b = [b[0].min(c), b[1].max(c)];
-            }
-        }
-        bounds
-    }
-}
-
-/// A flat surface across one of the grid's axes.
-#[derive(Debug, Clone)]
-struct Plane {
-    axis: usize,
-    /// Along the axis, metres.
-    offset: f64,
-    /// Its cells, all in one layer, by index.
-    cells: Vec<Index>,
-}
-
-/// Boxes of the room around placed furniture; floor and walls first, the rest by falling size. Nothing of it is within a
+/// Boxes of the room around placed furniture; floor and walls first, the rest by falling surface. Nothing of it is within a
 /// centimetre of a part anywhere in its range so far (0..=`upper`). Empty where there is no furniture.
 pub(super) fn boxes(cells: &RoomCells, furniture: &[Furniture], config: &config::Fitting) -> Vec<Solid> {
+    let rules = &config.boxes;
     let grid = Grid { axes: cells.axes, edge: cells.edge_m };
     if furniture.is_empty() {
         return Vec::new();
     }
-    let bodies: Vec<OrientedBox> = furniture.iter().map(hull).collect();
+    let bodies: Vec<OrientedBox> = furniture.iter().map(body).collect();
     let standing = grid.bounds(bodies.iter().flat_map(OrientedBox::corners));
     let reach = config.room_reach_m;
     let near = |index: &Index| {
@@ -88,46 +31,166 @@ pub(super) fn boxes(cells: &RoomCells, furniture: &[Furniture], config: &config:
     };
     let mut occupied: BTreeMap<Index, Extent> =
         cells.cells.iter().filter(|c| near(&c.index)).map(|c| (c.index, c.extent)).collect();
-    let planes = flattened(&mut occupied, grid.edge);
+    let planes = flattened(&mut occupied, grid.edge, rules);
     let all: Vec<Index> = occupied.keys().copied().collect();
 
     let swept: Vec<OrientedBox> = furniture.iter().flat_map(|f| sweep(&f.part)).collect();
-    for shape in bodies.iter().chain(&swept) {
-        empty(&mut occupied, shape, &grid);
-    }
+    let blockers: Vec<OrientedBox> = bodies.iter().chain(&swept).map(|b| grown(b, rules.margin_m)).collect();
+    let taken = taken(&blockers, &occupied, &grid);
+    occupied.retain(|index, _| !taken.contains(index));
+    let mut known = Known { occupied, free: &cells.free, taken };
+
     let mut solids = Vec::new();
     let mut add = |name: String, extent: &Extent| {
         solids.push(Solid { name, role: Role::Room, shape: grid.shape(extent), seen: true });
     };
-    let floor = floor(&planes, &standing, &grid, &swept);
+    let floor = floor(&planes, &standing, &grid, &swept, rules);
     if let Some((slab, surface)) = &floor {
-        take(&mut occupied, slab, 2, |z| z <= surface + 0.6 * grid.edge, &grid);
+        take(&mut known.occupied, slab, 2, |z| z <= surface + rules.cell_share * grid.edge, &grid);
         add("room_floor".to_owned(), slab);
     }
     let ground = floor.map(|(slab, _)| slab[2][1]);
-    let mut walls = 0;
-    for plane in planes.iter().filter(|p| p.axis < 2) {
-        let Some((slab, outward)) = wall(plane, &all, ground, &grid) else { continue };
-        let shape = grid.shape(&slab);
-        // A carcass that was assumed too deep may reach into the wall, a part may not.
-        if swept.iter().any(|s| overlap::boxes(&grown(s), &shape)) {
-            continue;
-        }
-        take(&mut occupied, &slab, plane.axis, |c| outward * (c - plane.offset) > -0.6 * grid.edge, &grid);
-        add(format!("room_wall_{walls}"), &slab);
-        walls += 1;
+    // A carcass that was assumed too deep may reach into the wall, a part may not.
+    let free = |slab: &Extent| swept.iter().all(|s| !overlap::boxes(&grown(s, rules.margin_m), &grid.shape(slab)));
+    let upright = planes.iter().filter(|p| p.axis < 2);
+    let walls: Vec<Wall> = upright
+        .filter_map(|p| wall(p, (all.as_slice(), ground), &known, &grid, rules))
+        .filter(|w| free(&w.slab))
+        .collect();
+    for (i, wall) in walls.iter().enumerate() {
+        let Wall { axis, offset, outward, .. } = *wall;
+        let slab = Some(met(wall, &walls, rules)).filter(&free).unwrap_or(wall.slab);
+        take(&mut known.occupied, &slab, axis, |c| outward * (c - offset) > -rules.cell_share * grid.edge, &grid);
+        add(format!("room_wall_{i}"), &slab);
     }
-    drop_specks(&mut occupied);
-    let mut rest = joined(&occupied);
-    rest.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
-    for (i, (_, extent)) in rest.iter().take(config.room_boxes).enumerate() {
-        add(format!("room_{i:03}"), extent);
+    if config.room_boxes > 0 {
+        drop_specks(&mut known.occupied, rules.speck_cells);
+        for (i, shape) in rest(known, &planes, &blockers, &grid, config).into_iter().enumerate() {
+            solids.push(Solid { name: format!("room_{i:03}"), role: Role::Room, shape, seen: true });
+        }
     }
     solids
 }
 
-/// The box around a whole piece of furniture, closed, in the axes of its face: what it holds inside is its own.
-fn hull(piece: &Furniture) -> OrientedBox {
+/// The boxes beside floor and walls, by falling surface: what stands turned against the room first, in its own axes.
+fn rest(
+    mut known: Known,
+    planes: &[Plane],
+    blockers: &[OrientedBox],
+    grid: &Grid,
+    config: &config::Fitting,
+) -> Vec<OrientedBox> {
+    let mut found = Vec::new();
+    for heading in turned::headings(&known.occupied, planes, grid, &config.turned) {
+        let (mut occupied, free) = heading.known(&known, planes, grid);
+        flattened(&mut occupied, grid.edge, &config.boxes);
+        let taken = taken(blockers, &occupied, &heading.grid);
+        occupied.retain(|index, _| !taken.contains(index));
+        let some = covered(&Known { occupied, free: &free, taken }, blockers, &heading.grid, config);
+        let reach: Vec<OrientedBox> =
+            some.iter().map(|(_, shape)| grown(shape, config.boxes.cell_share * grid.edge)).collect();
+        known.occupied.retain(|_, extent| {
+            let p = grid.shape(extent).center;
+            !reach.iter().any(|shape| shape.contains(&p))
+        });
+        found.extend(some);
+    }
+    found.extend(covered(&known, blockers, grid, config));
+    found.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
+    found.into_iter().take(config.room_boxes).map(|(_, shape)| shape).collect()
+}
+
+/// The boxes that cover what is known, with the cells of surface in each.
+fn covered(
+    known: &Known,
+    blockers: &[OrientedBox],
+    grid: &Grid,
+    config: &config::Fitting,
+) -> Vec<(usize, OrientedBox)> {
+    let limits = cover::Limits {
+        surface: (config.room_box_m2 / grid.edge.powi(2)).ceil().clamp(1.0, 1e9) as usize,
+        solid: (config.room_solid_m / grid.edge).ceil().clamp(1.0, 1e6) as i32,
+    };
+    let thin = config.room_box_thin_m;
+    let shape = |(count, block): &(usize, Block)| {
+        let extent = widened(block, known, blockers, grid, config).map(|side| no_thinner(side, thin));
+        let mut sides = extent.map(|[low, high]| high - low);
+        sides.sort_by(f64::total_cmp);
+        (sides[1] >= config.room_box_side_m).then(|| (*count, grid.shape(&extent)))
+    };
+    cover::blocks(known, &limits, &config.cover).iter().filter_map(shape).collect()
+}
+
+fn no_thinner([low, high]: [f64; 2], thin: f64) -> [f64; 2] {
+    let (middle, half) = (0.5 * (low + high), 0.5 * (high - low).max(thin));
+    [middle - half, middle + half]
+}
+
+/// A block's box: its faces where surfaces are, then as far out as they should be and nothing is in the way.
+fn widened(block: &Block, known: &Known, blockers: &[OrientedBox], grid: &Grid, config: &config::Fitting) -> Extent {
+    /// Numerics: steps in which a face is moved out.
+    const TRIES: u32 = 8;
+    let rules = &config.boxes;
+    let mut extent = cover::extent(block, known, grid.edge, config.cover.face_share);
+    let reach = grown(&grid.shape(&extent), 2.0 * grid.edge + rules.wall_m);
+    let near: Vec<&OrientedBox> = blockers.iter().filter(|b| overlap::boxes(b, &reach)).collect();
+    let clear = |extent: &Extent| near.iter().all(|b| !overlap::boxes(b, &grid.shape(extent)));
+    // A surface may lie a little outside of its cells; within them nothing is in the way.
+    for (axis, end) in sides() {
+        if clear(&extent) {
+            break;
+        }
+        let borders = [block[0][axis], block[1][axis]].map(|i| f64::from(i) * grid.edge);
+        extent[axis][end] = extent[axis][end].clamp(borders[0], borders[1]);
+    }
+    for (axis, end) in sides() {
+        let from = extent[axis][end];
+        let by = wanted(block, &extent, (axis, end), known, grid.edge, rules) - from;
+        for i in (1..=TRIES).rev().filter(|_| by != 0.0) {
+            let mut wider = extent;
+            wider[axis][end] = from + by * f64::from(i) / f64::from(TRIES);
+            if clear(&wider) {
+                extent = wider;
+                break;
+            }
+        }
+    }
+    extent
+}
+
+/// Axis and end of all faces.
+fn sides() -> impl Iterator<Item = (usize, usize)> {
+    (0..3).flat_map(|axis| [(axis, 0), (axis, 1)])
+}
+
+/// Where one face of a block's box should be, metres along the axis: a sheet that was seen from one side becomes as thick as a
+/// wall towards the other; what ends at the cells that furniture or the way of a part takes should end right before these.
+fn wanted(
+    block: &Block,
+    extent: &Extent,
+    (axis, end): (usize, usize),
+    known: &Known,
+    edge: f64,
+    rules: &config::RoomBoxes,
+) -> f64 {
+    // The layer outside of an end, and the way out.
+    let outside = |end: usize| if end == 0 { (block[0][axis] - 1, -1) } else { (block[1][axis], 1) };
+    let open = |end: usize| cover::is_open(block, axis, outside(end).0, outside(end).1, known);
+    let (at, way) = outside(end);
+    let thickness = extent[axis][1] - extent[axis][0];
+    let taken = known.share(block, axis, at, |index| known.taken.contains(index));
+    if taken >= rules.taken_share && known.share(block, axis, at, |index| known.is_free(index)) < rules.free_share {
+        f64::from(block[end][axis] + way) * edge
+    } else if thickness < rules.wall_m && !open(end) && open(1 - end) {
+        extent[axis][end] + f64::from(way) * (rules.wall_m - thickness)
+    } else {
+        extent[axis][end]
+    }
+}
+
+/// The box around a whole piece of furniture, closed, in the axes of its face: what it holds inside is its own. World, metres.
+#[must_use]
+pub fn body(piece: &Furniture) -> OrientedBox {
     let rotation = piece.part.bounds.rotation;
     let axes = [0, 1, 2].map(|k| rotation.column(k).into_owned());
     let grid = Grid { axes, edge: 1.0 };
@@ -135,9 +198,12 @@ fn hull(piece: &Furniture) -> OrientedBox {
     grid.shape(&grid.bounds(solids.flat_map(|s| s.shape.corners())))
 }
 
-/// The part's boxes wherever they are over the part's range, and as far beyond as a part may have been left by a hand whose
-/// motion was seen to end there.
-fn sweep(part: &Part) -> Vec<OrientedBox> {
+/// The part's boxes (world, metres) wherever they are over the part's range, and as far beyond as a part may have been left by a
+/// hand whose motion was seen to end there; from one pose to the next nothing goes further than 2 cm.
+#[must_use]
+pub fn sweep(part: &Part) -> Vec<OrientedBox> {
+    /// Geometry: from one pose of a part to the next no corner of it goes further, metres: half of it stays within the margin.
+    const TRAVEL_M: f64 = 0.02;
     let phi = part.joint.articulation;
     let lever = match phi.kind {
         JointKind::Prismatic => 1.0,
@@ -152,141 +218,35 @@ fn sweep(part: &Part) -> Vec<OrientedBox> {
         .collect()
 }
 
-fn grown(shape: &OrientedBox) -> OrientedBox {
-    OrientedBox { half: shape.half.map(|h| h + MARGIN_M), ..*shape }
+fn grown(shape: &OrientedBox, by: f64) -> OrientedBox {
+    OrientedBox { half: shape.half.map(|h| h + by), ..*shape }
 }
 
-/// Empties all cells that come within the margin of a box (and, at its edges, a few that do not).
-fn empty(occupied: &mut BTreeMap<Index, Extent>, shape: &OrientedBox, grid: &Grid) {
-    let shape = grown(shape);
-    let layers = grid.bounds(shape.corners()).map(|b| b.map(|c| (c / grid.edge).floor() as i32));
-    // Half of a cell as seen along each of the box's axes.
-    let cell: [f64; 3] = std::array::from_fn(|i| {
-        0.5 * grid.edge * grid.axes.iter().map(|a| a.dot(&shape.rotation.column(i)).abs()).sum::<f64>()
-    });
-    let rows = (layers[0][0]..=layers[0][1]).flat_map(|x| (layers[1][0]..=layers[1][1]).map(move |y| (x, y)));
-    let gone: Vec<Index> = rows
-        .flat_map(|(x, y)| occupied.range([x, y, layers[2][0]]..=[x, y, layers[2][1]]).map(|(index, _)| *index))
-        .filter(|index| {
+/// The cells within the occupied ones' bounds that share space with a box (and, at its edges, a few that do not).
+fn taken(blockers: &[OrientedBox], occupied: &BTreeMap<Index, Extent>, grid: &Grid) -> HashSet<Index> {
+    let mut bounds = [[i32::MAX; 3], [i32::MIN; 3]];
+    for index in occupied.keys() {
+        for (k, i) in index.iter().enumerate() {
+            bounds[0][k] = bounds[0][k].min(*i);
+            bounds[1][k] = bounds[1][k].max(*i);
+        }
+    }
+    let mut out = HashSet::new();
+    for shape in blockers {
+        let layers = grid.bounds(shape.corners()).map(|b| b.map(|c| (c / grid.edge).floor() as i32));
+        let low: Index = std::array::from_fn(|k| layers[k][0].max(bounds[0][k]));
+        let high: Index = std::array::from_fn(|k| layers[k][1].min(bounds[1][k]).saturating_add(1));
+        // Half of a cell as seen along each of the box's axes.
+        let cell: [f64; 3] = std::array::from_fn(|i| {
+            0.5 * grid.edge * grid.axes.iter().map(|a| a.dot(&shape.rotation.column(i)).abs()).sum::<f64>()
+        });
+        out.extend(within([low, high]).filter(|index| {
             let middle = grid.axes.iter().zip(index).fold(Vector::zeros(), |sum, (a, i)| sum + a * grid.middle(*i));
             let local = shape.rotation.transpose() * (middle - shape.center.coords);
             (0..3).all(|i| local[i].abs() <= shape.half[i] + cell[i])
-        })
-        .collect();
-    for index in gone {
-        occupied.remove(&index);
+        }));
     }
-}
-
-/// Finds the large flat surfaces across the grid's axes and sets their cells into one thin layer each: noise and the grid
-/// spread a surface over two or three. Level ones first.
-fn flattened(occupied: &mut BTreeMap<Index, Extent>, edge: f64) -> Vec<Plane> {
-    /// A front of 40 x 50 cm; smaller surfaces stay as their cells have them.
-    const LEAST_M2: f64 = 0.2;
-    /// More planes along one axis are clutter.
-    const MOST: usize = 16;
-    let mut planes: Vec<Plane> = Vec::new();
-    let mut settled: HashSet<Index> = HashSet::new();
-    for axis in [2, 0, 1] {
-        let there: HashSet<Index> = occupied.keys().copied().collect();
-        let mut flat: Vec<(f64, Index)> = occupied
-            .iter()
-            .filter(|(index, _)| !settled.contains(*index) && lies_across(&there, index, axis))
-            .map(|(index, extent)| (0.5 * (extent[axis][0] + extent[axis][1]), *index))
-            .collect();
-        flat.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        for _ in 0..MOST {
-            let heights: Vec<f64> = flat.iter().map(|(h, _)| *h).collect();
-            let Some(window) = densest(&heights, edge).filter(|w| w.len() as f64 * edge * edge >= LEAST_M2) else {
-                break;
-            };
-            let Some(offset) = stats::median(&heights[window]) else { break };
-            let layer = (offset / edge).floor() as i32;
-            let onto = |index: &Index| {
-                let mut index = *index;
-                index[axis] = layer;
-                index
-            };
-            // A rim goes on to one side only.
-            let mut members: Vec<Index> = flat
-                .iter()
-                .filter(|(h, _)| (h - offset).abs() <= edge)
-                .flat_map(|(_, index)| beside(onto(index), axis))
-                .collect();
-            members.sort_unstable();
-            members.dedup();
-            flat.retain(|(h, _)| (h - offset).abs() > edge);
-            // The members, and what lies on them as thinly as noise does.
-            let on: Vec<Index> = occupied
-                .iter()
-                .filter(|(index, extent)| {
-                    (0.5 * (extent[axis][0] + extent[axis][1]) - offset).abs() <= edge
-                        && !settled.contains(*index)
-                        && members.binary_search(&onto(index)).is_ok()
-                })
-                .map(|(index, _)| *index)
-                .collect();
-            let mut sheet: BTreeMap<Index, Extent> = BTreeMap::new();
-            for index in on {
-                let Some(mut extent) = occupied.remove(&index) else { continue };
-                extent[axis] = [offset - SHEET_M, offset + SHEET_M];
-                sheet.entry(onto(&index)).and_modify(|e| *e = around(e, &extent)).or_insert(extent);
-            }
-            let cells: Vec<Index> = sheet.keys().copied().collect();
-            settled.extend(cells.iter().copied());
-            occupied.extend(sheet);
-            planes.push(Plane { axis, offset, cells });
-        }
-    }
-    planes
-}
-
-/// A cell and its neighbours within its layer across an axis.
-fn beside(index: Index, axis: usize) -> impl Iterator<Item = Index> {
-    let [a, b] = match axis {
-        0 => [1, 2],
-        1 => [0, 2],
-        _ => [0, 1],
-    };
-    (0..9).map(move |i| {
-        let mut other = index;
-        other[a] += i % 3 - 1;
-        other[b] += i / 3 - 1;
-        other
-    })
-}
-
-fn around(a: &Extent, b: &Extent) -> Extent {
-    std::array::from_fn(|k| [a[k][0].min(b[k][0]), a[k][1].max(b[k][1])])
-}
-
-/// Whether a surface runs through a cell across an axis: it goes on to all four sides, give or take a layer, and is not
-/// itself the middle of something that goes on along the axis.
-fn lies_across(there: &HashSet<Index>, index: &Index, axis: usize) -> bool {
-    let at = |along: usize, by: i32, shift: i32| {
-        let mut other = *index;
-        other[along] += by;
-        other[axis] += shift;
-        there.contains(&other)
-    };
-    let goes_on = |along: usize| [-1, 1].iter().all(|&by| [0, -1, 1].iter().any(|&shift| at(along, by, shift)));
-    let deep = at(axis, 0, 2) && at(axis, 0, -2);
-    !deep && (0..3).filter(|k| *k != axis).all(goes_on)
-}
-
-/// The members of a sorted list within the window that holds most of them.
-fn densest(sorted: &[f64], window: f64) -> Option<std::ops::Range<usize>> {
-    let mut best: Option<std::ops::Range<usize>> = None;
-    let mut start = 0;
-    for (end, &last) in sorted.iter().enumerate() {
-        while last - sorted[start] > window {
-            start += 1;
-        }
-        if best.as_ref().is_none_or(|b| end + 1 - start > b.len()) {
-            best = Some(start..end + 1);
-        }
-    }
-    best
+    out
 }
 
 /// Bounds of a plane's cells within itself, without its last few.
@@ -304,51 +264,82 @@ fn area(plane: &Plane, grid: &Grid) -> f64 {
     plane.cells.len() as f64 * grid.edge * grid.edge
 }
 
-/// The floor's slab and the height of its surface: the lowest large level, where all furniture stands on or above it. The
+/// The floor's slab and the height of its surface: the largest of the lowest levels, where all furniture stands on or above it. The
 /// slab is as wide as the floor was seen and the furniture stands, and a little lower where a part needs the space.
-fn floor(planes: &[Plane], standing: &Extent, grid: &Grid, swept: &[OrientedBox]) -> Option<(Extent, f64)> {
-    /// Less is a mat or a shelf.
-    const LEAST_M2: f64 = 0.5;
-    /// Furniture and floor are known to this.
-    const NOISE_M: f64 = 0.1;
-    let plane = planes
-        .iter()
-        .filter(|p| p.axis == 2 && area(p, grid) >= LEAST_M2)
-        .min_by(|a, b| a.offset.total_cmp(&b.offset))
-        .filter(|p| p.offset <= standing[2][0] + NOISE_M)?;
+fn floor(
+    planes: &[Plane],
+    standing: &Extent,
+    grid: &Grid,
+    swept: &[OrientedBox],
+    rules: &config::RoomBoxes,
+) -> Option<(Extent, f64)> {
+    let noise_m = rules.floor_noise_m;
+    let level = || planes.iter().filter(move |p| p.axis == 2 && area(p, grid) >= rules.floor_m2);
+    // Noise leaves levels below the floor, too; the floor is the largest.
+    let deepest = level().map(|p| p.offset).min_by(f64::total_cmp)?;
+    let near = level().filter(|p| p.offset <= deepest + noise_m);
+    let plane = near.max_by_key(|p| p.cells.len()).filter(|p| p.offset <= standing[2][0] + noise_m)?;
     let lowest = grid.bounds(swept.iter().flat_map(OrientedBox::corners))[2][0];
-    let top = plane.offset.min(lowest - MARGIN_M);
-    if top < plane.offset - NOISE_M {
+    let top = plane.offset.min(lowest - rules.margin_m);
+    if top < plane.offset - noise_m {
         return None;
     }
     let seen = rectangle(plane, grid)?;
     let mut slab = around(&seen, standing);
-    slab[2] = [top - WALL_M, top];
+    slab[2] = [top - rules.wall_m, top];
     Some((slab, plane.offset))
 }
 
-/// A wall's slab and the sense (+1, -1) in which it faces away from the room along the plane's axis: a large upright
-/// surface behind which next to nothing was seen. It reaches down to the ground.
-fn wall(plane: &Plane, all: &[Index], ground: Option<f64>, grid: &Grid) -> Option<(Extent, f64)> {
-    const LEAST_M2: f64 = 1.0;
-    /// A row of base cupboards is lower.
-    const LEAST_HEIGHT_M: f64 = 1.2;
-    /// Noise behind a wall.
-    const BEHIND_SHARE: f64 = 0.02;
+/// A wall.
+struct Wall {
+    slab: Extent,
+    /// The axis across it, its surface along that, metres, and the sense (+1, -1) in which it faces away from the room.
+    axis: usize,
+    offset: f64,
+    outward: f64,
+}
+
+/// The wall that a plane is: a large upright surface behind which next to nothing was seen. It reaches down to the ground.
+fn wall(
+    plane: &Plane,
+    (all, ground): (&[Index], Option<f64>),
+    known: &Known,
+    grid: &Grid,
+    rules: &config::RoomBoxes,
+) -> Option<Wall> {
     let mut slab = rectangle(plane, grid)?;
-    if area(plane, grid) < LEAST_M2 || slab[2][1] - slab[2][0] < LEAST_HEIGHT_M {
+    if area(plane, grid) < rules.wall_m2 || slab[2][1] - slab[2][0] < rules.wall_height_m {
         return None;
     }
     let outward = [1.0, -1.0].into_iter().find(|outward| {
         let behind = |index: &&Index| outward * (grid.middle(index[plane.axis]) - plane.offset) > 1.5 * grid.edge;
-        all.iter().filter(behind).count() as f64 <= BEHIND_SHARE * all.len() as f64
+        all.iter().filter(behind).count() as f64 <= rules.behind_share * all.len() as f64
     })?;
-    let back = plane.offset + outward * WALL_M;
+    let at = (plane.offset / grid.edge).floor() as i32;
+    let block = [0, 1].map(|end| slab.map(|side| (side[end] / grid.edge).round() as i32));
+    let through = |index: &Index| known.is_free(index) && plane.cells.binary_search(index).is_err();
+    if known.share(&block, plane.axis, at, through) > rules.through_share {
+        return None;
+    }
+    let back = plane.offset + outward * rules.wall_m;
     slab[plane.axis] = [plane.offset.min(back), plane.offset.max(back)];
     if let Some(ground) = ground {
         slab[2][0] = slab[2][0].min(ground);
     }
-    Some((slab, outward))
+    Some(Wall { slab, axis: plane.axis, offset: plane.offset, outward })
+}
+
+/// A wall's slab, drawn out to the back of the walls that it nearly meets.
+fn met(wall: &Wall, walls: &[Wall], rules: &config::RoomBoxes) -> Extent {
+    let mut slab = wall.slab;
+    for other in walls.iter().filter(|w| w.axis != wall.axis) {
+        let end = usize::from(other.outward > 0.0);
+        let side = &mut slab[other.axis][end];
+        if (*side - other.offset).abs() < rules.met_m {
+            *side = other.offset + other.outward * rules.wall_m;
+        }
+    }
+    slab
 }
 
 /// Takes the cells away that a slab stands for: those before its face, for which `belongs` holds along the axis.
@@ -368,11 +359,16 @@ fn take(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Matrix3;
+
     use crate::articulation::Articulation;
-    use crate::pipeline::RoomCell;
+    use crate::math::Point;
+    use crate::pipeline::{FreeRun, RoomCell};
     use crate::twin::Joint;
 
     const EDGE: f64 = 0.05;
+    const MARGIN_M: f64 = 0.02;
+    const WALL_M: f64 = 0.05;
 
     /// A door 0.5 m wide between x = 0 and 0.5, its front at y = 0 looking towards -y, hinged at x = 0; behind it its back.
     fn door() -> Furniture {
@@ -441,7 +437,7 @@ mod tests {
                 .or_insert(extent);
         }
         let cells = cells.into_iter().map(|(index, extent)| RoomCell { index, views: 3, extent }).collect();
-        RoomCells { axes: grid.axes, edge_m: EDGE, cells }
+        RoomCells { axes: grid.axes, edge_m: EDGE, cells, free: Vec::new() }
     }
 
     #[test]
@@ -471,7 +467,7 @@ mod tests {
         }
         // All that is seen away from the door is there.
         let grid = Grid { axes: room.axes, edge: EDGE };
-        let body = grid.bounds(sweep(&piece.part).iter().chain([&hull(&piece)]).flat_map(OrientedBox::corners));
+        let body = grid.bounds(sweep(&piece.part).iter().chain([&body(&piece)]).flat_map(OrientedBox::corners));
         let (mut away, mut covered) = (0u32, 0usize);
         for cell in &room.cells {
             let middle = cell.extent.map(|[low, high]| 0.5 * (low + high));
@@ -480,7 +476,7 @@ mod tests {
             }
             let p = Point::from(middle);
             away += 1;
-            covered += usize::from(solids.iter().any(|s| grown(&s.shape).contains(&p)));
+            covered += usize::from(solids.iter().any(|s| grown(&s.shape, MARGIN_M).contains(&p)));
         }
         assert!(away > 5000 && covered as f64 > 0.95 * f64::from(away), "{covered} of {away}");
     }
@@ -512,13 +508,70 @@ mod tests {
                 occupied.insert([x, y, z], [[0.045 + 0.01 * f64::from(x); 2], extent(y), extent(z)]);
             }
         }
-        let planes = flattened(&mut occupied, EDGE);
+        let planes = flattened(&mut occupied, EDGE, &config::RoomBoxes::default());
         assert_eq!(planes.len(), 1);
         assert_eq!(planes[0].axis, 0);
-        let sheet = joined(&occupied);
+        let known = Known { occupied, free: &[], taken: HashSet::new() };
+        let sheet = cover::blocks(&known, &cover::Limits { surface: 40, solid: 20 }, &config::Cover::default());
         assert_eq!(sheet.len(), 1);
         assert_eq!(sheet[0].0, 400);
-        let [low, high] = sheet[0].1[0];
+        let [low, high] = cover::extent(&sheet[0].1, &known, EDGE, 0.25)[0];
         assert!((low - 0.04).abs() < 1e-9 && (high - 0.06).abs() < 1e-9, "{low} {high}");
+    }
+
+    /// Air before and above everything of [`room`], and inside of the door's furniture, as far as views saw it.
+    fn air() -> Vec<FreeRun> {
+        (-30..40)
+            .flat_map(|x| (-40..12).map(move |y| [x, y]))
+            .map(|[x, y]| FreeRun { column: [x, y], span: [if y < -1 { 2 } else { 19 }, 46] })
+            .collect()
+    }
+
+    #[test]
+    fn fronts_and_worktop_become_solid_and_the_air_before_them_stays_free() {
+        let room = RoomCells { free: air(), ..room() };
+        let piece = door();
+        let solids = boxes(&room, std::slice::from_ref(&piece), &config::Fitting::default());
+        // Floor, wall, the furniture to both sides, the worktop above the door.
+        assert!((5..8).contains(&solids.len()), "{:?}", solids.iter().map(|s| &s.name).collect::<Vec<_>>());
+        let inside = |p: [f64; 3]| solids.iter().any(|s| s.shape.contains(&Point::from(p)));
+        for p in [[-0.7, 0.3, 0.5], [1.2, 0.3, 0.5], [-0.7, 0.05, 0.2], [0.2, 0.3, 0.85], [-0.1, 0.3, 0.5]] {
+            assert!(inside(p), "nothing at {p:?}: {solids:?}");
+        }
+        for p in [[-0.7, -0.03, 0.5], [0.3, 0.3, 0.5], [0.3, -0.2, 0.5], [0.0, -1.0, 1.0], [-0.7, 0.3, 0.9]] {
+            assert!(!inside(p), "something at {p:?}: {solids:?}");
+        }
+        // Surfaces lie where they were seen: fronts, worktop.
+        let left = solids.iter().find(|s| s.shape.contains(&Point::new(-0.7, 0.3, 0.5))).unwrap().shape;
+        assert!((left.center.y - left.half.y - 0.004).abs() < 1e-6, "{left:?}");
+        assert!(solids.iter().any(|s| (s.shape.center.z + s.shape.half.z - 0.86).abs() < 1e-6), "{solids:?}");
+        let sides = |s: &Solid| s.shape.half.iter().all(|h| *h >= 0.005);
+        assert!(solids.iter().all(sides));
+    }
+
+    #[test]
+    fn a_passage_is_no_wall() {
+        let mut room = RoomCells { free: air(), ..room() };
+        // Half of the wall is missing, and views saw through the gap.
+        room.cells.retain(|c| c.index[1] != 12 || !(-10..25).contains(&c.index[0]) || c.index[2] > 43);
+        room.free.extend((-10..25).flat_map(|x| (12..20).map(move |y| FreeRun { column: [x, y], span: [19, 43] })));
+        room.free.sort_by_key(|run| (run.column, run.span));
+        let solids = boxes(&room, std::slice::from_ref(&door()), &config::Fitting::default());
+        assert!(!solids.iter().any(|s| s.name.starts_with("room_wall")), "{solids:?}");
+        let inside = |p: [f64; 3]| solids.iter().any(|s| s.shape.contains(&Point::from(p)));
+        assert!(inside([-1.0, 0.62, 1.5]) && inside([1.6, 0.62, 1.5]) && !inside([0.3, 0.62, 1.5]), "{solids:?}");
+    }
+
+    #[test]
+    fn walls_meet_in_their_corner() {
+        let wall = |axis: usize, offset: f64, outward: f64, side: [f64; 2]| {
+            let mut slab = [[0.0, 0.0], [0.0, 0.0], [0.0, 2.5]];
+            slab[axis] = if outward > 0.0 { [offset, offset + WALL_M] } else { [offset - WALL_M, offset] };
+            slab[1 - axis] = side;
+            Wall { slab, axis, offset, outward }
+        };
+        let walls = [wall(0, 3.0, 1.0, [0.1, 2.0]), wall(1, 0.0, -1.0, [0.0, 2.9]), wall(1, 4.0, 1.0, [0.0, 2.9])];
+        assert_eq!(met(&walls[0], &walls, &config::RoomBoxes::default())[1], [-WALL_M, 2.0]);
+        assert_eq!(met(&walls[1], &walls, &config::RoomBoxes::default())[0], [0.0, 3.0 + WALL_M]);
     }
 }

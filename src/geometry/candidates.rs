@@ -31,6 +31,8 @@ pub enum AxisSource {
     Manhattan,
     /// The principal direction of the hand's path.
     HandPath,
+    /// Where a front of a usual size has its edge, which nobody saw.
+    Assumed,
 }
 
 /// Which edge of the face a hinge lies at, seen by the person.
@@ -101,6 +103,8 @@ impl AxisSource {
             // Next to a hinge a door hardly moves, so the outline ends a few centimetres short of it.
             Self::PartEdge => 0.06,
             Self::FaceEdge => 0.08,
+            // Half of the way between two usual sizes.
+            Self::Assumed => 0.08,
             // The fit itself.
             _ => 0.2,
         }
@@ -130,7 +134,7 @@ pub fn settled(candidate: &AxisCandidate, paths: &[Vec<Point>], reasoning: &conf
     };
     let center = circle::common_center(&arcs, &prior);
     // Farther than that it is another hinge, which has its own candidate.
-    if !center.coords.norm().is_finite() || center.coords.norm() > 3.0 * std_m {
+    if !center.coords.norm().is_finite() || center.coords.norm() > reasoning.settled_within * std_m {
         return candidate.clone();
     }
     let joint = Articulation { origin: origin + e1 * center.x + e2 * center.y, ..candidate.joint };
@@ -173,7 +177,49 @@ pub fn collect(evidence: &Evidence, config: &config::Inference) -> Vec<AxisCandi
     out
 }
 
-/// Below this share of the motion along the face's normal (17 degrees) the sign of that share is noise: the joint moves
+/// The axes of a part whose front is assumed: hinges at lines near the front and where fronts of usual sizes have their edges,
+/// the hand's arcs, slides along the front's own directions. `evidence.path` leads from closed to open.
+#[must_use]
+pub fn on_assumed(evidence: &Evidence, config: &config::Inference, fronts: &config::Fronts) -> Vec<AxisCandidate> {
+    let Some(face) = evidence.face else { return collect(evidence, config) };
+    let snap = config.snap_deg.to_radians();
+    let mut out = Vec::new();
+    for track in evidence.tracks {
+        let middle = track.segment.middle();
+        let Some((direction, upright)) = snapped(face, &track.segment.line.direction, snap) else { continue };
+        let [right, up, height] = face.coordinates(&middle);
+        let aside = if upright { right } else { up };
+        // The front's heading is off by some degrees, and its place by what handles stand off.
+        if height.abs() <= config.at_face_m + snap.sin() * aside.abs() && aside.abs() >= config.min_radius_m {
+            let side = Some(side_of(aside, upright));
+            out.push(AxisCandidate { side, ..AxisCandidate::at_line(track, direction, 0.0) });
+        }
+    }
+    for &offset in &fronts.usual_levers_m {
+        for (axis, offset) in [(0, -offset), (0, offset), (1, -offset), (1, offset)] {
+            out.push(edge(face, axis, offset, 0.0, 0.0, AxisSource::Assumed));
+        }
+    }
+    for direction in [face.up, face.right] {
+        if let Some(joint) = arc_about(evidence.path, &direction) {
+            let side = Some(side_at(face, &direction, &joint.origin));
+            let shift = implausibility(face, &joint, &config.arcs);
+            out.push(AxisCandidate { side, shift, ..AxisCandidate::new(joint, AxisSource::HandArc) });
+        }
+    }
+    let origin = evidence.path.first().copied().unwrap_or(evidence.grip);
+    let own = [face.normal, face.right, face.up];
+    for (axis, source) in own.into_iter().zip([AxisSource::FaceNormal, AxisSource::FaceAxis, AxisSource::FaceAxis]) {
+        let joint = Articulation { kind: JointKind::Prismatic, axis, origin };
+        out.push(AxisCandidate::new(joint, source));
+    }
+    for candidate in &mut out {
+        candidate.joint = outward(candidate.joint, face, &evidence.grip);
+    }
+    out
+}
+
+/// Geometry: below this share of the motion along the face's normal (17 degrees) the sign of that share is noise: the joint moves
 /// within its face.
 pub const IN_FACE: f64 = 0.3;
 
@@ -206,13 +252,13 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
             let Some((direction, upright)) = snapped(face, &track.segment.line.direction, snap) else { continue };
             let [right, up, height] = face.coordinates(&track.segment.middle());
             // A hinge lies at its face: deeper or nearer lines are the carcass, the floor, other furniture.
-            if height.abs() <= 0.08 {
+            if height.abs() <= config.at_face_m {
                 let side = Some(side_of(if upright { right } else { up }, upright));
                 out.push(AxisCandidate { side, ..AxisCandidate::at_line(track, direction, named(i)) });
             }
         }
         let middles = evidence.rect.map_or([0.0; 2], middles);
-        for (axis, offset, length_m) in plane_edges(face, evidence.surface) {
+        for (axis, offset, length_m) in plane_edges(face, evidence.surface, &config.plane_edges) {
             out.push(edge(face, axis, offset, middles[1 - axis], length_m, AxisSource::PlaneEdge));
         }
         if let Some(rect) = evidence.rect {
@@ -229,7 +275,7 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
     };
     for direction in directions {
         if let Some(joint) = arc_about(evidence.path, &direction) {
-            let shift = evidence.face.map_or(0.0, |face| implausibility(face, &joint));
+            let shift = evidence.face.map_or(0.0, |face| implausibility(face, &joint, &config.arcs));
             let side = evidence.face.map(|face| side_at(face, &direction, &joint.origin));
             out.push(AxisCandidate { side, shift, ..AxisCandidate::new(joint, AxisSource::HandArc) });
         }
@@ -240,7 +286,7 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
 /// (world) out of the face.
 #[must_use]
 pub fn at_sides(face: &Face, outlines: &[Rect], grip: &Point) -> Vec<AxisCandidate> {
-    /// Less than an outline's side is known, metres.
+    /// Geometry: sides that are nearer to each other are one, metres; less than an outline is known to.
     const ONE_M: f64 = 0.02;
     let mut out: Vec<AxisCandidate> = Vec::new();
     for mut hinge in outlines.iter().flat_map(|rect| edges(face, rect, AxisSource::PartEdge)) {
@@ -277,32 +323,30 @@ fn edge(face: &Face, axis: usize, offset: f64, middle: f64, length_m: f64, sourc
 
 /// Where other sides of the furniture meet its face: (0 = upright edge or 1 = level one, its offset, the length seen), in face
 /// coordinates. A side is a dense thin slab of points behind the face, square to it.
-fn plane_edges(face: &Face, surface: &[Point]) -> Vec<(usize, f64, f64)> {
-    const SLAB_M: f64 = 0.02;
-    // Behind the front board and its noise, not as deep as the wall.
-    const DEPTH_M: std::ops::Range<f64> = 0.05..0.5;
+fn plane_edges(face: &Face, surface: &[Point], rules: &config::PlaneEdges) -> Vec<(usize, f64, f64)> {
+    let [nearest_m, farthest_m] = rules.behind_m;
     let behind: Vec<[f64; 3]> =
-        surface.iter().map(|p| face.coordinates(p)).filter(|c| DEPTH_M.contains(&-c[2])).collect();
+        surface.iter().map(|p| face.coordinates(p)).filter(|c| (nearest_m..farthest_m).contains(&-c[2])).collect();
     let mut out = Vec::new();
     for axis in [0, 1] {
         let mut slabs: std::collections::BTreeMap<i64, Vec<[f64; 3]>> = std::collections::BTreeMap::new();
         for c in &behind {
-            slabs.entry((c[axis] / SLAB_M).floor() as i64).or_default().push(*c);
+            slabs.entry((c[axis] / rules.slab_m).floor() as i64).or_default().push(*c);
         }
         let empty = Vec::new();
         for (slab, points) in &slabs {
-            // A side is seen over some depth and some length; a slab with less than a third of all is the inside's clutter.
+            // A side is seen over some depth and some length; a slab with a small share of all is the inside's clutter.
             let beside = [slab - 1, slab + 1].map(|s| slabs.get(&s).unwrap_or(&empty).len());
-            if 3 * points.len() < behind.len() || points.len() <= beside[0].max(beside[1]) {
+            if rules.most_slabs * points.len() < behind.len() || points.len() <= beside[0].max(beside[1]) {
                 continue;
             }
             let spread = |k: usize| {
                 let values: Vec<f64> = points.iter().map(|c| c[k]).collect();
-                let low = crate::math::stats::quantile(&values, 0.05);
-                low.zip(crate::math::stats::quantile(&values, 0.95)).map_or(0.0, |(l, h)| h - l)
+                let low = crate::math::stats::quantile(&values, rules.rim_share);
+                low.zip(crate::math::stats::quantile(&values, 1.0 - rules.rim_share)).map_or(0.0, |(l, h)| h - l)
             };
             let length = spread(1 - axis);
-            if points.len() >= 100 && length > 0.15 && spread(2) > 0.1 {
+            if points.len() >= rules.least_points && length > rules.least_length_m && spread(2) > rules.least_depth_m {
                 let values: Vec<f64> = points.iter().map(|c| c[axis]).collect();
                 out.extend(crate::math::stats::median(&values).map(|offset| (axis, offset, length)));
             }
@@ -313,14 +357,12 @@ fn plane_edges(face: &Face, surface: &[Point]) -> Vec<(usize, f64, f64)> {
 
 /// How far the centre of an arc lies from where a hinge can be, in standard deviations: off the plane of the face, or
 /// beyond the end of the furniture. A short noisy arc has its centre anywhere along its bisector.
-fn implausibility(face: &Face, joint: &Articulation) -> f64 {
-    const OFF_PLANE_STD_M: f64 = 0.05;
-    const BEYOND_STD_M: f64 = 0.08;
+fn implausibility(face: &Face, joint: &Articulation, arcs: &config::Arcs) -> f64 {
     let at = face.coordinates(&joint.origin);
     let across = usize::from(unsigned_angle(&joint.axis, &face.up) > unsigned_angle(&joint.axis, &face.right));
     let [low, high] = face.extent[across];
     let beyond = (low - at[across]).max(at[across] - high).max(0.0);
-    (at[2] / OFF_PLANE_STD_M).hypot(beyond / BEYOND_STD_M)
+    (at[2] / arcs.off_plane_std_m).hypot(beyond / arcs.beyond_std_m)
 }
 
 /// The edge at which a hinge through `origin` along the face's `axis` lies.
@@ -446,7 +488,7 @@ mod tests {
                 Point::new(0.302 + 0.002 * f64::from(i % 3), 0.01 * f64::from(i % 30), 0.7 + 0.02 * f64::from(i / 30))
             })
             .collect();
-        let found = plane_edges(&face, &side);
+        let found = plane_edges(&face, &side, &config::PlaneEdges::default());
         assert_eq!(found.len(), 1, "{found:?}");
         assert!(found[0].0 == 0 && (found[0].1 - 0.304).abs() < 3e-3, "{found:?}");
     }

@@ -13,34 +13,10 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
+use crate::config;
 use crate::math::{Point, Vector, stats};
 use crate::recording::sketch::Sketch;
-use crate::recording::{Camera, DepthFactors, Recording};
-
-/// Surface samples of a frame that take part.
-const SAMPLES: usize = 700;
-/// Frames that each frame is compared with.
-const PARTNERS: usize = 10;
-/// Noise of one depth sample across its surface, metres: pixel noise, the bending of estimated depth and poses.
-const SAMPLE_STD_M: f64 = 0.02;
-/// Samples of a pair share their errors: together they are worth this many.
-const INDEPENDENT: f64 = 6.0;
-/// Spread of the frames' factors about their common one, and of the common one about 1.
-const FRAME_STD: f64 = 0.03;
-const COMMON_STD: f64 = 0.15;
-
-/// Surfaces this near to each other are taken for one: wide at first, to bridge the error of the scale, then narrow, to
-/// tell surfaces apart.
-const GATES_M: [f64; 3] = [0.2, 0.1, 0.05];
-/// Of the samples every so many-th takes part at each gate: while surfaces are brought together a few tell as much as all.
-const STRIDES: [usize; 3] = [4, 4, 1];
-/// A few coincidences of all samples of two frames are no common surface.
-const LEAST_LINKS: usize = 12;
-/// Change of the factors from one comparison to the next, root mean square, that is none: a tenth of what they can be told to.
-/// Single frames that see little of what others see drift on for long.
-const SETTLED: f64 = 5e-4;
-/// Comparisons a gate at the most; each brings the places that are compared nearer to each other.
-const ROUNDS: usize = 25;
+use crate::recording::{Camera, DepthFactors, DepthNoise, Recording};
 
 /// A surface sample of a frame, world axes.
 struct Sample {
@@ -77,56 +53,116 @@ struct Pair {
 /// Solves the factors that each frame's depth has to be multiplied by: 1 where nothing tells, the common one for frames
 /// that are not among the sketches. The search starts at the recording's own factors.
 #[must_use]
-pub fn solve(recording: &Recording, sketches: &BTreeMap<usize, Sketch>) -> DepthFactors {
+pub fn solve(recording: &Recording, sketches: &BTreeMap<usize, Sketch>, rules: &config::DepthScales) -> DepthFactors {
+    /// Numerics: comparisons a gate at the most; each brings the places that are compared nearer to each other.
+    const ROUNDS: usize = 25;
     let views: Vec<View> = sketches
         .par_iter()
         .filter(|(f, _)| recording.frames[**f].files.depth.is_some())
-        .map(|(_, s)| view(recording, s))
+        .map(|(_, s)| view(recording, s, rules))
         .collect();
     if views.len() < 2 {
         return DepthFactors::default();
     }
-    let partners: Vec<Vec<usize>> = (0..views.len()).into_par_iter().map(|a| partners(recording, &views, a)).collect();
+    let partners: Vec<Vec<usize>> =
+        (0..views.len()).into_par_iter().map(|a| partners(recording, &views, a, rules)).collect();
     let mut factors: Vec<f64> = views.iter().map(|v| recording.depth_factor(v.sketch.frame)).collect();
-    'gates: for (gate_m, stride) in GATES_M.into_iter().zip(STRIDES) {
+    'gates: for (gate_m, stride) in rules.gates_m.into_iter().zip(rules.strides) {
         for _ in 0..ROUNDS {
             let pairs: Vec<Vec<Pair>> = partners
                 .par_iter()
                 .enumerate()
                 .map(|(a, others)| {
                     let pair = |&b: &usize| {
-                        let links = compare(recording, &views, [a, b], &factors, gate_m, stride);
-                        (links.len() >= LEAST_LINKS.div_ceil(stride))
-                            .then(|| weighed(&links, b, [factors[a], factors[b]], gate_m))
+                        let links =
+                            compare(recording, (views.as_slice(), factors.as_slice()), [a, b], gate_m, stride, rules);
+                        (links.len() >= rules.least_links.div_ceil(stride))
+                            .then(|| weighed(&links, b, [factors[a], factors[b]], gate_m, rules))
                     };
                     others.iter().filter_map(pair).collect()
                 })
                 .collect();
-            let Some(next) = adjust(&pairs) else { break 'gates };
+            let Some(next) = adjust(&pairs, rules) else { break 'gates };
             let moved: f64 = next.iter().zip(&factors).map(|(a, b)| (a - b).powi(2)).sum();
             factors = next;
-            if moved < views.len() as f64 * SETTLED * SETTLED {
+            if moved < views.len() as f64 * rules.settled * rules.settled {
                 break;
             }
         }
     }
     let other = stats::median(&factors).unwrap_or(1.0);
-    DepthFactors { by_frame: views.iter().map(|v| v.sketch.frame).zip(factors).collect(), other }
+    let noise = noise(recording, (views.as_slice(), factors.as_slice()), &partners, rules);
+    DepthFactors { by_frame: views.iter().map(|v| v.sketch.frame).zip(factors).collect(), other, noise }
 }
 
-fn view<'a>(recording: &Recording, sketch: &'a Sketch) -> View<'a> {
+/// The noise law of the frames' depth once their factors are known, from how far apart two frames see one surface. Every
+/// `rules.noise_every`-th place is looked at. Errors that all frames share do not show in it.
+fn noise(
+    recording: &Recording,
+    (views, factors): (&[View], &[f64]),
+    partners: &[Vec<usize>],
+    rules: &config::DepthScales,
+) -> Option<DepthNoise> {
+    let apart: Vec<Vec<[f64; 2]>> = partners
+        .par_iter()
+        .enumerate()
+        .map(|(a, others)| {
+            let of = |&b: &usize| {
+                let links = compare(recording, (views, factors), [a, b], rules.gates_m[0], rules.noise_every, rules);
+                links.into_iter().map(move |l| (l, [factors[a], factors[b]]))
+            };
+            let links = others.iter().flat_map(of);
+            links.map(|(link, f)| [distance(link, f), residual(link, f).abs()]).collect()
+        })
+        .collect();
+    let mut apart: Vec<[f64; 2]> = apart.into_iter().flatten().collect();
+    if apart.len() < rules.noise_places {
+        return None;
+    }
+    apart.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    // Of the difference of two: a frame's own is smaller by the root of two. The median of an absolute value is robust.
+    let of_one = stats::NORMAL_PER_MEDIAN / std::f64::consts::SQRT_2;
+    let bins: Vec<[f64; 2]> = apart
+        .chunks(apart.len().div_ceil(rules.noise_bins))
+        .filter_map(|bin| {
+            let of = |k: usize| stats::median(&bin.iter().map(|b| b[k]).collect::<Vec<f64>>());
+            Some([of(0)?, of_one * of(1)?])
+        })
+        .collect();
+    Some(straight(&bins))
+}
+
+/// The line through standard deviations over distances, neither below zero at the camera nor falling.
+fn straight(bins: &[[f64; 2]]) -> DepthNoise {
+    let count = bins.len().max(1) as f64;
+    let mean = |k: usize| bins.iter().map(|b| b[k]).sum::<f64>() / count;
+    let [at, std] = [mean(0), mean(1)];
+    let spread: f64 = bins.iter().map(|b| (b[0] - at).powi(2)).sum();
+    let rise: f64 = bins.iter().map(|b| (b[0] - at) * (b[1] - std)).sum();
+    let steepest = std / at.max(f64::EPSILON);
+    let per_m = if spread > 0.0 { (rise / spread).clamp(0.0, steepest) } else { 0.0 };
+    DepthNoise { floor_m: std - per_m * at, per_m }
+}
+
+/// How far away the place of a comparison is, across its surface, metres.
+fn distance([xa, xb, _]: Link, [a, b]: [f64; 2]) -> f64 {
+    0.5 * (a * xa.abs() + b * xb.abs())
+}
+
+fn view<'a>(recording: &Recording, sketch: &'a Sketch, rules: &config::DepthScales) -> View<'a> {
     // Wide enough to average pixel noise, narrow enough for a drawer's front.
-    let reach = (sketch.depth_mm.width / 40).max(2);
+    let reach = (sketch.depth_mm.width / rules.normal_reach).max(2);
     let pose = &recording.frames[sketch.frame].world_from_camera;
     let area = sketch.depth_mm.data.len();
-    let stride = ((area as f64 / SAMPLES as f64).sqrt().round() as usize).max(1);
+    let stride = ((area as f64 / rules.samples as f64).sqrt().round() as usize).max(1);
+    let camera = recording.camera_of(sketch.frame);
     let mut samples = Vec::new();
     for y in (stride / 2..sketch.depth_mm.height).step_by(stride) {
         for x in (stride / 2..sketch.depth_mm.width).step_by(stride) {
-            let Some(p) = sketch.point(&recording.camera, x, y) else { continue };
-            let Some(n) = sketch.normal(&recording.camera, x, y, reach) else { continue };
+            let Some(p) = sketch.point(camera, x, y) else { continue };
+            let Some(n) = sketch.normal(camera, x, y, reach) else { continue };
             // Surfaces seen at a grazing angle have no usable normal.
-            if -n.dot(&p.coords.normalize()) > 0.25 {
+            if -n.dot(&p.coords.normalize()) > rules.least_slant_cos {
                 let (offset, normal) = (pose.rotation * p.coords, pose.rotation * n);
                 samples.push(Sample { offset, normal, along: normal.dot(&offset) });
             }
@@ -136,25 +172,24 @@ fn view<'a>(recording: &Recording, sketch: &'a Sketch) -> View<'a> {
 }
 
 /// Frames that see what frame `a` sees from another distance: those that tell its factor best.
-fn partners(recording: &Recording, views: &[View], a: usize) -> Vec<usize> {
+fn partners(recording: &Recording, views: &[View], a: usize, rules: &config::DepthScales) -> Vec<usize> {
     let from = &views[a];
-    let probes: Vec<&Sample> = from.samples.iter().step_by((from.samples.len() / 60).max(1)).collect();
+    let probes: Vec<&Sample> = from.samples.iter().step_by((from.samples.len() / rules.probes).max(1)).collect();
     // In a long recording every n-th frame is candidate enough.
-    let stride = (views.len() / 600).max(1);
+    let stride = (views.len() / rules.candidates).max(1);
     let mut scored: Vec<(f64, usize)> = (0..views.len())
         .filter(|&b| b != a && (a + b).is_multiple_of(stride))
         .map(|b| {
             let baseline = from.center - views[b].center;
+            let camera = recording.camera_of(views[b].sketch.frame);
             let camera_from_world = recording.frames[views[b].sketch.frame].world_from_camera.inverse();
             let told: f64 = probes
                 .iter()
                 .filter(|s| {
                     let local = camera_from_world * (from.center + s.offset);
-                    local.z > 0.2
-                        && recording.camera.project(&local).is_some_and(|(u, v)| recording.camera.contains(u, v))
+                    local.z > rules.nearest_m && camera.project(&local).is_some_and(|(u, v)| camera.contains(u, v))
                 })
-                // More than half a metre hardly helps and sees other things.
-                .map(|s| s.normal.dot(&baseline).abs().min(0.5))
+                .map(|s| s.normal.dot(&baseline).abs().min(rules.most_baseline_m))
                 .sum();
             (told, b)
         })
@@ -162,24 +197,26 @@ fn partners(recording: &Recording, views: &[View], a: usize) -> Vec<usize> {
         .collect();
     scored.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
     // Half of the best, half spread over the rest: ratios between like views are worth something too.
-    let best = PARTNERS / 2;
+    let best = rules.partners / 2;
     let rest = scored.get(best..).unwrap_or_default();
     let mut chosen: Vec<usize> = scored.iter().take(best).map(|s| s.1).collect();
-    chosen.extend(rest.iter().step_by((rest.len() / (PARTNERS - best)).max(1)).take(PARTNERS - best).map(|s| s.1));
+    chosen.extend(
+        rest.iter().step_by((rest.len() / (rules.partners - best)).max(1)).take(rules.partners - best).map(|s| s.1),
+    );
     chosen
 }
 
 /// Places of frame a that frame b sees too, under the present factors, of every `stride`-th sample.
 fn compare(
     recording: &Recording,
-    views: &[View],
+    (views, factors): (&[View], &[f64]),
     [a, b]: [usize; 2],
-    factors: &[f64],
     gate_m: f64,
     stride: usize,
+    rules: &config::DepthScales,
 ) -> Vec<Link> {
     let (from, to) = (&views[a], &views[b]);
-    let camera: &Camera = &recording.camera;
+    let camera: &Camera = recording.camera_of(to.sketch.frame);
     let world_from_camera =
         recording.frames[to.sketch.frame].world_from_camera.rotation.to_rotation_matrix().into_inner();
     let camera_from_world = world_from_camera.transpose();
@@ -191,7 +228,7 @@ fn compare(
         .step_by(stride)
         .filter_map(|s| {
             let local = Point::from(center + turned * s.offset);
-            let (u, v) = camera.project(&local).filter(|_| local.z > 0.2)?;
+            let (u, v) = camera.project(&local).filter(|_| local.z > rules.nearest_m)?;
             let (x, y) = to.sketch.sample(u, v)?;
             let z = f64::from(to.sketch.depth_m(y * to.sketch.depth_mm.width + x));
             if z <= 0.0 {
@@ -207,15 +244,15 @@ fn compare(
             }
             // A side of a board can lie in the plane's slab far from the place that was looked for.
             let place = baseline + s.offset * factors[a] - other * factors[b];
-            (place.norm() <= gate_m + 0.05).then_some(link)
+            (place.norm() <= gate_m + rules.same_place_m).then_some(link)
         })
         .collect()
 }
 
 /// The links of a pair, robustly weighted.
-fn weighed(links: &[Link], b: usize, factors: [f64; 2], gate_m: f64) -> Pair {
-    let weight = (INDEPENDENT / links.len() as f64).min(1.0) / SAMPLE_STD_M.powi(2);
-    let scale = (0.4 * gate_m).max(SAMPLE_STD_M);
+fn weighed(links: &[Link], b: usize, factors: [f64; 2], gate_m: f64, rules: &config::DepthScales) -> Pair {
+    let weight = (rules.independent / links.len() as f64).min(1.0) / rules.sample_std_m.powi(2);
+    let scale = (rules.gate_scale * gate_m).max(rules.sample_std_m);
     let mut pair = Pair { b, matrix: [0.0; 6], rhs: [0.0; 3] };
     for &link in links {
         let w = weight / (1.0 + (residual(link, factors) / scale).powi(2)).powi(2);
@@ -232,11 +269,11 @@ fn weighed(links: &[Link], b: usize, factors: [f64; 2], gate_m: f64) -> Pair {
 ///
 /// Each frame meets a few others and the common factor: all but one row of the system are sparse. The common factor is
 /// eliminated, and what is left is solved by conjugate gradients, in time that grows with the number of frames.
-fn adjust(pairs: &[Vec<Pair>]) -> Option<Vec<f64>> {
+fn adjust(pairs: &[Vec<Pair>], rules: &config::DepthScales) -> Option<Vec<f64>> {
     let n = pairs.len();
-    let mut frames = Sparse { diagonal: vec![FRAME_STD.powi(-2); n], rows: vec![Vec::new(); n] };
+    let mut frames = Sparse { diagonal: vec![rules.frame_std.powi(-2); n], rows: vec![Vec::new(); n] };
     let (mut rhs, mut border) = (vec![0.0; n], vec![0.0; n]);
-    let (mut corner, mut corner_rhs) = (COMMON_STD.powi(-2), COMMON_STD.powi(-2));
+    let (mut corner, mut corner_rhs) = (rules.common_std.powi(-2), rules.common_std.powi(-2));
     for (a, pair) in pairs.iter().enumerate().flat_map(|(a, of)| of.iter().map(move |p| (a, p))) {
         let [aa, ab, at, bb, bt, tt] = pair.matrix;
         frames.diagonal[a] += aa;
@@ -254,7 +291,8 @@ fn adjust(pairs: &[Vec<Pair>]) -> Option<Vec<f64>> {
     let t = (corner_rhs - dot(&border, &own)) / (corner - dot(&border, &common));
     let next: Vec<f64> = own.iter().zip(&common).map(|(own, common)| (1.0 + own - t * common) / t).collect();
     // Half or twice the depth is a broken export, which is told elsewhere.
-    next.iter().all(|s| (0.5..2.0).contains(s)).then_some(next)
+    let [least, most] = rules.factors;
+    next.iter().all(|s| (least..most).contains(s)).then_some(next)
 }
 
 /// A symmetric positive definite matrix of which most is zero.
@@ -275,9 +313,9 @@ impl Sparse {
 
     /// Conjugate gradients with the diagonal as preconditioner (Hestenes and Stiefel 1952); `None` where they do not settle.
     fn solve(&self, rhs: &[f64]) -> Option<Vec<f64>> {
-        /// Of the right-hand side: far below what any factor is known to.
+        /// Numerics: of the right-hand side, far below what any factor is known to.
         const EXACT: f64 = 1e-12;
-        /// The prior on the diagonal bounds the condition: some hundred steps are usual.
+        /// Numerics: the prior on the diagonal bounds the condition: some hundred steps are usual.
         const STEPS: usize = 10_000;
         let scaled = |r: &[f64]| -> Vec<f64> { r.iter().zip(&self.diagonal).map(|(r, d)| r / d).collect() };
         let mut x = vec![0.0; rhs.len()];
@@ -348,17 +386,7 @@ mod tests {
             });
             sketches.insert(i, Sketch::of(i, &depth, None));
         }
-        let recording = Recording {
-            name: String::new(),
-            dir: std::path::PathBuf::new(),
-            camera,
-            frames,
-            clips: Vec::new(),
-            hands: Vec::new(),
-            labels: BTreeMap::new(),
-            reconstruction: Vec::new(),
-            depth_factors: DepthFactors::default(),
-        };
+        let recording = Recording { frames, ..Recording::empty(camera) };
         (recording, sketches)
     }
 
@@ -367,7 +395,7 @@ mod tests {
         for common in [0.88, 1.0, 1.12] {
             let truth: Vec<f64> = (0..10).map(|i| common * (1.0 + 0.015 * f64::from(i % 3 - 1))).collect();
             let (recording, sketches) = corner(&truth);
-            let found = solve(&recording, &sketches);
+            let found = solve(&recording, &sketches, &config::DepthScales::default());
             for (i, factor) in truth.iter().enumerate() {
                 assert!((found.of(i) / factor - 1.0).abs() < 5e-3, "{common}: frame {i}: {} of {factor}", found.of(i));
             }
@@ -403,8 +431,9 @@ mod tests {
         let truth: Vec<f64> = (0..10).map(|i| 1.06 * (1.0 + 0.015 * f64::from(i % 3 - 1))).collect();
         let (mut recording, sketches) = corner(&truth);
         for start in [0.97, 1.06, 1.15] {
-            recording.depth_factors = DepthFactors { by_frame: BTreeMap::from([(0, 1.0)]), other: start };
-            let found = solve(&recording, &sketches);
+            recording.depth_factors =
+                DepthFactors { by_frame: BTreeMap::from([(0, 1.0)]), other: start, ..Default::default() };
+            let found = solve(&recording, &sketches, &config::DepthScales::default());
             for (i, factor) in truth.iter().enumerate() {
                 assert!((found.of(i) / factor - 1.0).abs() < 5e-3, "{start}: frame {i}: {} of {factor}", found.of(i));
             }
@@ -416,7 +445,7 @@ mod tests {
         let (mut recording, sketches) = corner(&[1.1; 4]);
         let pose = recording.frames[0].world_from_camera;
         recording.frames.iter_mut().for_each(|f| f.world_from_camera = pose);
-        let found = solve(&recording, &sketches);
+        let found = solve(&recording, &sketches, &config::DepthScales::default());
         assert!((found.other - 1.0).abs() < 0.02, "{}", found.other);
     }
 }

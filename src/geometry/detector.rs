@@ -1,21 +1,21 @@
 //! A detector of straight segments: regions of like gradient, grown from the steepest pixels (the idea of LSD, von Gioi et
 //! al., IPOL 2012), on an image that is smoothed as much as its noise asks for.
 
-use super::segments::Segment2;
+use super::segment2::Segment2;
 use crate::recording::Grid;
 
-/// Directions within this of each other belong together (LSD's 22.5 degrees), as a cosine.
+/// Definition (LSD): directions within this of each other belong together (LSD's 22.5 degrees), as a cosine.
 const COS_TOLERANCE: f32 = 0.923_88;
-/// The same for the second attempt on a region that is not straight.
+/// Definition: the same for the second attempt on a region that is not straight.
 const COS_TIGHT: f32 = 0.980_79;
-/// Probability that a direction agrees by chance: 22.5 of 180 degrees.
+/// Arithmetic: probability that a direction agrees by chance: 22.5 of 180 degrees.
 const CHANCE: f64 = 0.125;
-/// A rectangle less filled than this is no segment.
+/// Definition (LSD): a rectangle less filled than this is no segment.
 const DENSITY: f64 = 0.7;
 /// Of an edge's profile the part above this share of its steepest place makes the region; the foot below it belongs to the
 /// edge too but blurs with its surroundings.
 const FOOT: f32 = 0.2;
-/// Fractional bits of the smoothed image.
+/// Format: fractional bits of the smoothed image.
 const BITS: u32 = 5;
 /// A gradient that no camera's quantisation makes, grey values a pixel.
 const LEAST_GRADIENT: f64 = 3.0;
@@ -312,6 +312,7 @@ impl Field {
 
 /// Pixels by falling gradient, by a counting sort into 1024 classes; within a class in image order.
 fn steepest_first(steep: &[(u32, i32)]) -> Vec<u32> {
+    /// Numerics.
     const CLASSES: usize = 1024;
     let top = steep.iter().map(|(_, s)| *s).max().unwrap_or(1).max(1) as f32;
     let scale = (CLASSES - 1) as f32 / top.sqrt();

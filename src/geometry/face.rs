@@ -1,13 +1,15 @@
 //! The front face of the touched furniture: its plane, its own axes, its visible extent.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use super::LineTrack;
 use super::manhattan::ManhattanFrame;
-use crate::config;
+use crate::config::{self, Priors};
 use crate::math::plane::Plane;
 use crate::math::ransac::{Search, lo_ransac};
-use crate::math::stats::quantile;
+use crate::math::stats::{densest, quantile};
 use crate::math::{Point, Vector, any_orthogonal, reject, unit};
 
 /// A front face with a right-handed frame (`right`, `up`, `normal`) seen from the person's side.
@@ -24,7 +26,7 @@ pub struct Face {
     /// Visible extent `[right, up][min, max]` of the region in face coordinates, metres. It covers the whole piece of
     /// furniture where masks do.
     pub extent: [[f64; 2]; 2],
-    /// Share of the region's points near the grip that lie on the plane.
+    /// Share of the region's points near the grip that lie on the plane; zero of a face that is assumed.
     pub support: f64,
 }
 
@@ -48,12 +50,21 @@ impl Face {
         self.center + self.right * right + self.up * up + self.normal * out
     }
 
+    /// Whether nothing was seen on it: it is where the hand says that a front could be.
+    #[must_use]
+    pub fn is_assumed(&self) -> bool {
+        self.support <= 0.0
+    }
+
     /// Whether the face is nearer to horizontal than to vertical: a lid, a chest.
     #[must_use]
     pub fn is_horizontal(&self, world_up: &Vector) -> bool {
-        self.normal.dot(world_up).abs() > 0.7
+        self.normal.dot(world_up).abs() > LEVEL_COS
     }
 }
+
+/// Geometry: a normal nearer to the vertical than to any level direction has a larger cosine with it (45 degrees).
+pub(super) const LEVEL_COS: f64 = 0.7;
 
 /// A rectangle in face coordinates, metres: `[right, up][min, max]`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -69,9 +80,6 @@ impl Rect {
         self.bounds.map(|b| b[1] - b[0])
     }
 }
-
-/// Points this near to the grip vote for the face's plane.
-const NEIGHBOURHOOD_M: f64 = 0.45;
 
 /// What is known about the touched furniture before its face is.
 #[derive(Debug, Clone, Copy)]
@@ -98,18 +106,19 @@ pub struct Surroundings<'a> {
 /// that holds it, while any plane has a few points), the better the grip stands off it as hands hold handles, the more the motion
 /// leaves it, the nearer it is to upright or level and to the room's directions, and as the furniture's name has it level or not.
 #[must_use]
-pub fn fit(around: &Surroundings, config: &config::Geometry, seed: u64) -> Option<Face> {
-    let grip = around.grips[0];
-    let near: Vec<Point> = around.surface.iter().copied().filter(|p| (p - grip).norm() < NEIGHBOURHOOD_M).collect();
+pub fn fit(around: &Surroundings, config: &config::Geometry, priors: &Priors, seed: u64) -> Option<Face> {
+    let (grip, rules) = (around.grips[0], &config.face);
+    let near: Vec<Point> =
+        around.surface.iter().copied().filter(|p| (p - grip).norm() < rules.neighbourhood_m).collect();
     // Every n-th point is enough for a plane, and keeps the cost independent of the image size.
-    let near: Vec<Point> = near.iter().copied().step_by((near.len() / 3000).max(1)).collect();
-    if near.len() < 30 {
+    let near: Vec<Point> = near.iter().copied().step_by((near.len() / rules.points).max(1)).collect();
+    if near.len() < rules.least_points {
         return None;
     }
     let tolerance = config.face_tolerance_m;
     let share =
         |plane: &Plane| near.iter().filter(|p| plane.height(p).abs() <= tolerance).count() as f64 / near.len() as f64;
-    let score = |plane: &Plane| share(plane).powi(2) * face_prior(plane, around, config);
+    let score = |plane: &Plane| share(plane).powi(2) * face_prior(plane, around, rules, priors);
     let refine = |plane: Plane| {
         let inliers: Vec<Point> = near.iter().copied().filter(|p| plane.height(p).abs() <= tolerance).collect();
         Plane::fit(&inliers).map_or(plane, |p| p.facing(&around.viewpoint))
@@ -122,9 +131,10 @@ pub fn fit(around: &Surroundings, config: &config::Geometry, seed: u64) -> Optio
         // The densest slab of all, and the densest where a handle's face would be.
         let behind: Vec<f64> = {
             let at = normal.dot(&grip.coords);
-            heights.iter().copied().filter(|h| (at - 0.12..at + 0.03).contains(h)).collect()
+            let [behind_m, before_m] = rules.behind_grip_m;
+            heights.iter().copied().filter(|h| (at - behind_m..at + before_m).contains(h)).collect()
         };
-        for offset in [densest(&heights, 2.0 * tolerance), densest(&behind, 2.0 * tolerance)].into_iter().flatten() {
+        for offset in [&heights, &behind].into_iter().filter_map(|of| densest_middle(of, 2.0 * tolerance)) {
             let slab = Plane { normal, offset };
             candidates.extend([slab, refine(slab)]);
         }
@@ -132,10 +142,10 @@ pub fn fit(around: &Surroundings, config: &config::Geometry, seed: u64) -> Optio
     // Furniture turned against the room, or no room frame at all: planes from the points themselves. Several rounds, each
     // without the points that the planes before it explained.
     let mut left: Vec<Point> = near.clone();
-    for round in 0..3 {
+    for round in 0..rules.rounds {
         let found = lo_ransac::<Plane, 3>(
             left.len(),
-            Search { draws: 120, tolerance, seed: seed ^ round },
+            Search { draws: rules.draws, tolerance, seed: seed ^ round },
             |s| Plane::through(&left[s[0]], &left[s[1]], &left[s[2]]),
             |ids| Plane::fit(&ids.iter().map(|&i| left[i]).collect::<Vec<_>>()),
             |plane, i| plane.height(&left[i]).abs(),
@@ -143,19 +153,19 @@ pub fn fit(around: &Surroundings, config: &config::Geometry, seed: u64) -> Optio
         let Some(found) = found else { break };
         candidates.push(found.model.facing(&around.viewpoint));
         left.retain(|p| found.model.height(p).abs() > 2.0 * tolerance);
-        if left.len() < 30 {
+        if left.len() < rules.least_points {
             break;
         }
     }
     let plane = candidates.into_iter().max_by(|a, b| score(a).total_cmp(&score(b)))?;
-    let plane = uprighted(plane, &around.up, &near, tolerance);
+    let plane = uprighted(plane, &around.up, &near, config);
     let support = share(&plane);
     // A twentieth of the neighbourhood on a plane happens by chance; a face fills far more.
-    if support < 0.05 {
+    if support < rules.least_support {
         return None;
     }
     let normal = plane.normal;
-    let up = face_up(&plane, around);
+    let up = face_up(&plane, around, rules);
     let right = up.cross(&normal);
     let mut face = Face { center: plane.project(&grip), right, up, normal, extent: [[0.0; 2]; 2], support };
     let on_face: Vec<[f64; 3]> = around
@@ -164,88 +174,131 @@ pub fn fit(around: &Surroundings, config: &config::Geometry, seed: u64) -> Optio
         .map(|p| face.coordinates(p))
         .filter(|c| c[2].abs() <= 4.0 * config.face_tolerance_m)
         .collect();
+    let seen = seen_places(&on_face, rules);
+    // Sparse points fill no cell; then they are all there is.
+    let seen = if seen.is_empty() { on_face.iter().map(|c| [c[0], c[1]]).collect() } else { seen };
     for axis in 0..2 {
-        let values: Vec<f64> = on_face.iter().map(|c| c[axis]).collect();
-        face.extent[axis] = [quantile(&values, 0.01)?.min(0.0), quantile(&values, 0.99)?.max(0.0)];
+        let values: Vec<f64> = seen.iter().map(|place| place[axis]).collect();
+        face.extent[axis] =
+            [quantile(&values, rules.rim_share)?.min(0.0), quantile(&values, 1.0 - rules.rim_share)?.max(0.0)];
     }
     Some(face)
 }
 
-/// A front within 15 degrees of upright is upright: furniture stands on its feet, and a drawer that runs downhill opens by
+/// Middle of the densest window of sorted heights.
+fn densest_middle(sorted: &[f64], window: f64) -> Option<f64> {
+    let within = sorted.get(densest(sorted, window)?)?;
+    Some(0.5 * (within.first()? + within.last()?))
+}
+
+/// Corners of the pieces of a face where surface was seen, `[right, up]`, as far as points reach: the top of a tall door is as much
+/// of it as what is seen in every frame.
+fn seen_places(on_face: &[[f64; 3]], rules: &config::FaceRules) -> Vec<[f64; 2]> {
+    let mut cells: BTreeMap<[i64; 2], (usize, [[f64; 2]; 2])> = BTreeMap::new();
+    for [right, up, _] in on_face {
+        let at = [*right, *up];
+        let (count, [low, high]) = cells.entry(at.map(|x| (x / rules.cell_m).floor() as i64)).or_insert((0, [at, at]));
+        *count += 1;
+        for k in 0..2 {
+            low[k] = low[k].min(at[k]);
+            high[k] = high[k].max(at[k]);
+        }
+    }
+    let seen = cells.into_values().filter(|(count, _)| *count >= rules.cell_points);
+    seen.flat_map(|(_, corners)| corners).collect()
+}
+
+/// A front that is nearly upright is upright: furniture stands on its feet, and a drawer that runs downhill opens by
 /// itself. The offset follows from the points that lay on the plane.
-fn uprighted(plane: Plane, up: &Vector, near: &[Point], tolerance: f64) -> Plane {
-    if plane.normal.dot(up).abs() > 15f64.to_radians().sin() {
+fn uprighted(plane: Plane, up: &Vector, near: &[Point], config: &config::Geometry) -> Plane {
+    if plane.normal.dot(up).abs() > config.face.upright_deg.to_radians().sin() {
         return plane;
     }
     let Some(normal) = unit(&reject(&plane.normal, up)) else { return plane };
-    let offsets: Vec<f64> =
-        near.iter().filter(|p| plane.height(p).abs() <= tolerance).map(|p| normal.dot(&p.coords)).collect();
+    let offsets: Vec<f64> = near
+        .iter()
+        .filter(|p| plane.height(p).abs() <= config.face_tolerance_m)
+        .map(|p| normal.dot(&p.coords))
+        .collect();
     crate::math::stats::median(&offsets).map_or(plane, |offset| Plane { normal, offset })
 }
 
 /// How likely a plane is a front that opens, whatever the points say: 1 at best, half of it where no name tells.
-fn face_prior(plane: &Plane, around: &Surroundings, config: &config::Geometry) -> f64 {
+fn face_prior(plane: &Plane, around: &Surroundings, rules: &config::FaceRules, priors: &Priors) -> f64 {
+    let (fronts, handles) = (&priors.fronts, &priors.handles);
     let [closed, open] = around.grips;
-    let standoff = (plane.height(&closed) - config.grip_standoff_m) / 0.05;
-    let held = 0.15 + 0.85 * (-0.5 * standoff * standoff).exp();
-    // What opens leaves its face: a drawer straight, a door by half of its chord or more. Sliding doors do not.
-    let travel = open - closed;
-    let leaves = if travel.norm() < 0.06 {
-        1.0
-    } else {
-        0.25 + 0.75 * (plane.normal.dot(&travel) / travel.norm()).clamp(0.0, 1.0)
-    };
-    // People stand before what they open, not beside it.
-    let towards = crate::math::unit(&(around.viewpoint - closed)).map_or(1.0, |d| plane.normal.dot(&d));
-    let seen = 0.3 + 0.7 * (towards / 0.5).clamp(0.0, 1.0);
+    let standoff = (plane.height(&closed) - handles.standoff_m) / handles.standoff_std_m;
+    let held = habit(handles.not_held, (-0.5 * standoff * standoff).exp());
+    let left = leaves(&plane.normal, &(open - closed), rules.least_travel_m, fronts);
+    let seen = seen_from(&plane.normal, &(around.viewpoint - closed), rules.before_cos, fronts);
     let tilt = plane.normal.dot(&around.up).abs();
-    let upright = if !(0.15..=0.99).contains(&tilt) { 1.0 } else { 0.4 };
+    let [upright, level] = rules.aslant_cos;
+    let straight = if !(upright..=level).contains(&tilt) { 1.0 } else { fronts.aslant };
     let off_room = around.manhattan.map_or(0.0, |m| {
         m.axes.iter().map(|a| crate::math::unsigned_angle(a, &plane.normal)).fold(f64::INFINITY, f64::min)
     });
-    // A plane fitted to a few thousand points is a degree off by noise; the room's frame is not.
+    let [on_wall, near_wall] = rules.walls_deg;
     let in_room = match off_room.to_degrees() {
-        d if d < 0.2 => 1.0,
-        d if d < 8.0 => 0.9,
-        _ => 0.7,
+        d if d < on_wall => 1.0,
+        d if d < near_wall => fronts.nearly_on_walls,
+        _ => fronts.off_walls,
     };
-    let named = if tilt > 0.7 { around.level } else { 1.0 - around.level };
-    held * leaves * seen * upright * in_room * named
+    let named = if tilt > LEVEL_COS { around.level } else { 1.0 - around.level };
+    held * left * seen * straight * in_room * named
+}
+
+/// Weight of what fits a habit to a share, where what fits it not at all weighs `least`.
+fn habit(least: f64, share: f64) -> f64 {
+    least + (1.0 - least) * share
+}
+
+/// How well a motion leaves a front of that outward normal: a drawer straight, a door by half of its chord or more; a way that is
+/// shorter than `least_m` tells nothing. Sliding doors stay in theirs.
+pub(super) fn leaves(normal: &Vector, way: &Vector, least_m: f64, fronts: &config::Fronts) -> f64 {
+    let far = way.norm();
+    if far < least_m { 1.0 } else { habit(fronts.not_left, (normal.dot(way) / far).clamp(0.0, 1.0)) }
+}
+
+/// How well a person stands before a front of that outward normal: squarely up to this cosine of the angle to the front's own
+/// normal. People stand before what they open, not beside it.
+pub(super) fn seen_from(normal: &Vector, to_person: &Vector, before_cos: f64, fronts: &config::Fronts) -> f64 {
+    let towards = unit(to_person).map_or(1.0, |d| normal.dot(&d));
+    habit(fronts.from_beside, (towards / before_cos).clamp(0.0, 1.0))
 }
 
 /// Up within the face; on a lid, away from the person along the furniture's own edges.
-fn face_up(plane: &Plane, around: &Surroundings) -> Vector {
+fn face_up(plane: &Plane, around: &Surroundings, rules: &config::FaceRules) -> Vector {
     let normal = plane.normal;
-    if normal.dot(&around.up).abs() <= 0.7 {
+    if normal.dot(&around.up).abs() <= LEVEL_COS {
         return unit(&reject(&around.up, &normal)).unwrap_or_else(|| any_orthogonal(&normal));
     }
     let away = reject(&(around.grips[0] - around.viewpoint), &normal);
     let ahead = |d: Vector| if d.dot(&away) < 0.0 { -d } else { d };
-    let Some(d) = level_direction(plane, around) else { return unit(&away).unwrap_or_else(|| any_orthogonal(&normal)) };
+    let Some(d) = level_direction(plane, around, rules) else {
+        return unit(&away).unwrap_or_else(|| any_orthogonal(&normal));
+    };
     let [d, across] = [ahead(d), ahead(normal.cross(&d))];
     if d.dot(&away) >= across.dot(&away) { d } else { across }
 }
 
 /// One of the two directions in which a level face's edges run: that of most of the lines on it, the room's walls counting as
 /// one more.
-fn level_direction(plane: &Plane, around: &Surroundings) -> Option<Vector> {
-    /// Lines on the face, metres from its plane.
-    const NEAR_M: f64 = 0.05;
-    /// Spread of the directions of lines of one edge, radians.
-    const SPREAD: f64 = 0.05;
-    /// The room's own weight: a lid has two edges of half a metre that can be seen well, or none.
-    const WALLS_M: f64 = 1.0;
+fn level_direction(plane: &Plane, around: &Surroundings, rules: &config::FaceRules) -> Option<Vector> {
     let normal = plane.normal;
     let on_face = around.lines.iter().filter(|line| {
         let middle = line.segment.middle();
-        plane.height(&middle).abs() <= NEAR_M
-            && (middle - around.grips[0]).norm() <= 2.0 * NEIGHBOURHOOD_M
-            && line.segment.line.direction.dot(&normal).abs() < 0.2
+        plane.height(&middle).abs() <= rules.edges_within_m
+            && (middle - around.grips[0]).norm() <= 2.0 * rules.neighbourhood_m
+            && line.segment.line.direction.dot(&normal).abs() < rules.edges_level_sin
     });
-    let walls = around.manhattan.iter().flat_map(|m| m.axes).filter(|a| a.dot(&normal).abs() < 0.5);
+    let walls = around
+        .manhattan
+        .iter()
+        .flat_map(|m| m.axes)
+        .filter(|a| a.dot(&normal).abs() < 0.5 /* geometry: 60 degrees and more */);
     let directions: Vec<(Vector, f64)> = on_face
         .map(|line| (line.segment.line.direction, line.segment.length()))
-        .chain(walls.take(1).map(|a| (a, WALLS_M)))
+        .chain(walls.take(1).map(|a| (a, rules.walls_m)))
         .filter_map(|(d, weight)| Some((unit(&reject(&d, &normal))?, weight)))
         .collect();
     // Edges of furniture are square to each other: the angle counts up to quarter turns, -45 to 45 degrees.
@@ -254,32 +307,20 @@ fn level_direction(plane: &Plane, around: &Surroundings) -> Option<Vector> {
         0.25 * (4.0 * sine.atan2(cosine)).sin().atan2((4.0 * sine.atan2(cosine)).cos())
     };
     let support = |d: &Vector| -> f64 {
-        directions.iter().map(|(other, weight)| weight * (-0.5 * (off(d, other) / SPREAD).powi(2)).exp()).sum()
+        directions
+            .iter()
+            .map(|(other, weight)| weight * (-0.5 * (off(d, other) / rules.edges_spread_rad).powi(2)).exp())
+            .sum()
     };
     let (best, _) = directions
         .iter()
         .map(|(d, _)| (*d, support(d)))
         .reduce(|best, next| if next.1 > best.1 { next } else { best })?;
     // The mean of those that agree.
-    let agreeing = directions.iter().map(|(d, w)| (off(&best, d), *w)).filter(|(a, _)| a.abs() <= 2.0 * SPREAD);
+    let agreeing =
+        directions.iter().map(|(d, w)| (off(&best, d), *w)).filter(|(a, _)| a.abs() <= 2.0 * rules.edges_spread_rad);
     let (sum, total) = agreeing.fold((0.0, 0.0), |(sum, total), (a, w)| (sum + a * w, total + w));
     Some(crate::math::rotation(&normal, sum / total) * best)
-}
-
-/// Middle of the densest window of a sorted list.
-fn densest(sorted: &[f64], window: f64) -> Option<f64> {
-    let mut best: Option<(usize, f64)> = None;
-    let mut start = 0;
-    for end in 0..sorted.len() {
-        while sorted[end] - sorted[start] > window {
-            start += 1;
-        }
-        let count = end - start + 1;
-        if best.is_none_or(|b| count > b.0) {
-            best = Some((count, 0.5 * (sorted[start] + sorted[end])));
-        }
-    }
-    best.map(|b| b.1)
 }
 
 #[cfg(test)]
@@ -306,7 +347,7 @@ mod tests {
             level: 0.5,
             lines: &[],
         };
-        let face = fit(&around, &config::Geometry::default(), 0).unwrap();
+        let face = fit(&around, &config::Geometry::default(), &Priors::default(), 0).unwrap();
         assert!((face.normal + Vector::y()).norm() < 1e-6, "{face:?}");
         assert!((face.right - Vector::x()).norm() < 1e-6 && (face.up - Vector::z()).norm() < 1e-6);
         assert!((face.coordinates(&Point::new(0.05, -0.035, 0.7))[2] - 0.035).abs() < 1e-9);
@@ -335,7 +376,7 @@ mod tests {
                 level: 0.5,
                 lines: &[],
             };
-            fit(&around, &config::Geometry::default(), 0).unwrap().center.y
+            fit(&around, &config::Geometry::default(), &Priors::default(), 0).unwrap().center.y
         };
         let both: Vec<Point> = points.iter().chain(&leaf).copied().collect();
         assert!(fitted(&both).abs() < 0.01, "{}", fitted(&both));
@@ -378,7 +419,7 @@ mod tests {
                 up: Vector::z(),
                 level: 0.5,
             };
-            face_up(&plane, &around)
+            face_up(&plane, &around, &config::FaceRules::default())
         };
         let turned = Vector::new(-(0.349f64.sin()), 0.349f64.cos(), 0.0);
         assert!((up(&lines, Some(&room)) - turned).norm() < 0.01, "{}", up(&lines, Some(&room)));

@@ -8,7 +8,7 @@ use crate::config::{self, ManhattanMethod};
 use crate::error::Result;
 use crate::math::directions::{kmeans, mean_shift};
 use crate::math::{Point, Vector, any_orthogonal, unit};
-use crate::recording::{Grid, HAND_CLASS, Recording};
+use crate::recording::{Camera, Grid, HAND_CLASS, Recording};
 
 /// Three orthogonal directions of the room.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -29,18 +29,20 @@ pub fn estimate(recording: &Recording, views: &[usize], config: &config::Geometr
             let mut axes: Vec<(Vector, f64)> = Vec::new();
             let mut frames = 0;
             for (view, normals) in &by_view {
-                let Some(triple) = frame_triple(normals, config.normal_clusters) else { continue };
+                let Some(triple) = frame_triple(normals, config.normal_clusters, config.frame.orthogonal_cost) else {
+                    continue;
+                };
                 axes.extend(triple.map(|(axis, weight)| (rotated(*view, &axis), weight)));
                 frames += 1;
             }
-            let axes = combine(&axes, &recording.up(), config.mean_shift_deg.to_radians());
+            let axes = combine(&axes, &recording.up(), config.mean_shift_deg.to_radians(), config.frame.orthogonal_deg);
             Ok(axes.map(|axes| ManhattanFrame { axes, frames }))
         }
         ManhattanMethod::Gravity => {
             let all: Vec<Vector> =
                 by_view.iter().flat_map(|(view, normals)| normals.iter().map(|n| rotated(*view, n))).collect();
             let frames = by_view.iter().filter(|(_, normals)| !normals.is_empty()).count();
-            Ok(of_normals(&all, &recording.up()).map(|axes| ManhattanFrame { axes, frames }))
+            Ok(of_normals(&all, &recording.up(), &config.frame).map(|axes| ManhattanFrame { axes, frames }))
         }
     }
 }
@@ -48,27 +50,26 @@ pub fn estimate(recording: &Recording, views: &[usize], config: &config::Geometr
 /// The room's axes from unit normals in the world and its up direction (good to a few degrees), the upright axis last; `None`
 /// where there are next to no upright surfaces.
 #[must_use]
-pub fn of_normals(normals: &[Vector], up: &Vector) -> Option<[Vector; 3]> {
-    heading(normals, up).map(|start| refine(start, normals, up))
+pub fn of_normals(normals: &[Vector], up: &Vector, rules: &config::RoomFrame) -> Option<[Vector; 3]> {
+    heading(normals, up, rules).map(|start| refine(start, normals, up, rules))
 }
 
 /// The frame about the vertical that most upright surfaces agree on; `None` where there are next to none.
-fn heading(normals: &[Vector], up: &Vector) -> Option<[Vector; 3]> {
+fn heading(normals: &[Vector], up: &Vector, rules: &config::RoomFrame) -> Option<[Vector; 3]> {
+    /// Geometry: walls are a quarter of a turn apart; a bin a degree.
     const BINS: usize = 90;
-    /// Degrees to each side over which the histogram is smoothed: about the spread of noisy normals that remains in a mean.
-    const REACH: i64 = 4;
+    let reach = rules.smoothed_deg;
     let e1 = any_orthogonal(up);
     let e2 = up.cross(&e1);
     let mut histogram = [0u32; BINS];
-    // Within 20 degrees of level.
-    for n in normals.iter().filter(|n| n.dot(up).abs() < 0.35) {
+    for n in normals.iter().filter(|n| n.dot(up).abs() < rules.upright_sin) {
         let degrees = n.dot(&e2).atan2(n.dot(&e1)).to_degrees().rem_euclid(BINS as f64);
         histogram[(degrees as usize).min(BINS - 1)] += 1;
     }
-    if histogram.iter().sum::<u32>() < 50 {
+    if histogram.iter().sum::<u32>() < rules.least_normals {
         return None;
     }
-    let smoothed = |i: i64| (-REACH..=REACH).map(|d| histogram[(i + d).rem_euclid(BINS as i64) as usize]).sum::<u32>();
+    let smoothed = |i: i64| (-reach..=reach).map(|d| histogram[(i + d).rem_euclid(BINS as i64) as usize]).sum::<u32>();
     let best = (0..BINS as i64).max_by_key(|&i| (smoothed(i), -i))?;
     let yaw = (best as f64 + 0.5).to_radians();
     let first = e1 * yaw.cos() + e2 * yaw.sin();
@@ -76,17 +77,19 @@ fn heading(normals: &[Vector], up: &Vector) -> Option<[Vector; 3]> {
 }
 
 /// Robust rotation of the frame onto all normals: each normal pulls its nearest axis, the less the farther it is. Gravity
-/// pulls the upright axis with the weight of a fiftieth of the normals: it is known to a degree, and some rooms show neither
+/// pulls the upright axis with the weight of a small share of the normals: it is known to a degree, and some rooms show neither
 /// floor nor worktop.
-fn refine(start: [Vector; 3], normals: &[Vector], up: &Vector) -> [Vector; 3] {
+fn refine(start: [Vector; 3], normals: &[Vector], up: &Vector, rules: &config::RoomFrame) -> [Vector; 3] {
+    /// Numerics.
     const ROUNDS: usize = 12;
     // Beyond the cut a normal belongs to another structure.
-    let cut = 25f64.to_radians();
+    let cut = rules.cut_deg.to_radians();
+    let [narrow, wide] = rules.noise_deg.map(f64::to_radians);
     let mut axes = start;
     for round in 0..ROUNDS {
         // Wide weights first, to arrive; then about the normals' own noise, to be robust and waste none of them.
-        let scale = if round < ROUNDS / 2 { 15f64.to_radians() } else { spread(&axes, normals, cut) };
-        let mut pull = up * axes[2].transpose() * (0.02 * normals.len() as f64);
+        let scale = if round < ROUNDS / 2 { wide } else { spread(&axes, normals, cut, [narrow, wide]) };
+        let mut pull = up * axes[2].transpose() * (rules.gravity_share * normals.len() as f64);
         for n in normals {
             let mut best = (0, 0.0);
             for (i, axis) in axes.iter().enumerate() {
@@ -119,18 +122,18 @@ fn refine(start: [Vector; 3], normals: &[Vector], up: &Vector) -> [Vector; 3] {
     axes
 }
 
-/// Median angle of the normals to their axes (those within the cut), between 3 and 15 degrees.
-fn spread(axes: &[Vector; 3], normals: &[Vector], cut: f64) -> f64 {
+/// Median angle of the normals to their axes (those within the cut), between two bounds, radians.
+fn spread(axes: &[Vector; 3], normals: &[Vector], cut: f64, [narrow, wide]: [f64; 2]) -> f64 {
     let angle = |n: &Vector| axes.iter().map(|a| n.dot(a).abs()).fold(0.0, f64::max).min(1.0).acos();
     // A sample tells it well enough.
     let angles: Vec<f64> =
         normals.iter().step_by((normals.len() / 4000).max(1)).map(angle).filter(|a| *a <= cut).collect();
-    crate::math::stats::median(&angles).unwrap_or(cut).clamp(3f64.to_radians(), 15f64.to_radians())
+    crate::math::stats::median(&angles).unwrap_or(cut).clamp(narrow, wide)
 }
 
 /// Camera-frame normals of a view: from its normals file, else from the slope of its depth.
 pub fn view_normals(recording: &Recording, view: usize, config: &config::Geometry) -> Result<Vec<Vector>> {
-    let camera = &recording.camera;
+    let camera = recording.camera_of(view);
     let mask = recording.mask(view)?;
     let total = camera.width * camera.height;
     let step = ((total as f64 / config.normals_per_frame as f64).sqrt().floor() as usize).max(1);
@@ -147,22 +150,22 @@ pub fn view_normals(recording: &Recording, view: usize, config: &config::Geometr
             .collect());
     }
     let Some(depth) = recording.depth(view)? else { return Ok(Vec::new()) };
-    Ok(pixels.filter_map(|(x, y)| slope_normal(&depth, recording, x, y)).collect())
+    Ok(pixels.filter_map(|(x, y)| slope_normal(&depth, camera, [x, y], &config.frame)).collect())
 }
 
 /// Normal from the depths a few pixels to each side; `None` at depth edges and holes.
-fn slope_normal(depth: &Grid<f32>, recording: &Recording, x: usize, y: usize) -> Option<Vector> {
-    const REACH: usize = 4;
+fn slope_normal(depth: &Grid<f32>, camera: &Camera, [x, y]: [usize; 2], rules: &config::RoomFrame) -> Option<Vector> {
+    let reach = rules.slope_px;
     let at = |x: usize, y: usize| -> Option<Point> {
         let z = f64::from(depth.get(x, y)?);
-        (z > 0.0).then(|| recording.camera.unproject(x as f64, y as f64, z))
+        (z > 0.0).then(|| camera.unproject(x as f64, y as f64, z))
     };
     let centre = at(x, y)?;
-    let (left, right) = (at(x.checked_sub(REACH)?, y)?, at(x + REACH, y)?);
-    let (above, below) = (at(x, y.checked_sub(REACH)?)?, at(x, y + REACH)?);
+    let (left, right) = (at(x.checked_sub(reach)?, y)?, at(x + reach, y)?);
+    let (above, below) = (at(x, y.checked_sub(reach)?)?, at(x, y + reach)?);
     // Both sides of a pixel lie on one plane; at an edge the middle does not lie between them.
     let bend = (left.z + right.z - 2.0 * centre.z).abs() + (above.z + below.z - 2.0 * centre.z).abs();
-    if bend > 0.02 * centre.z {
+    if bend > rules.bend_share * centre.z {
         return None;
     }
     let normal = unit(&(right - left).cross(&(below - above)))?;
@@ -170,7 +173,7 @@ fn slope_normal(depth: &Grid<f32>, recording: &Recording, x: usize, y: usize) ->
 }
 
 /// Dominant orthogonal triple of one frame: the largest k-means cluster, and the two that are most orthogonal (§A.5).
-fn frame_triple(normals: &[Vector], k: usize) -> Option<[(Vector, f64); 3]> {
+fn frame_triple(normals: &[Vector], k: usize, most_cost: f64) -> Option<[(Vector, f64); 3]> {
     // Fewer normals than this per cluster are noise.
     if normals.len() < 10 * k {
         return None;
@@ -188,16 +191,16 @@ fn frame_triple(normals: &[Vector], k: usize) -> Option<[(Vector, f64); 3]> {
         }
     }
     // Three exactly orthogonal directions cost 0; a frame that sees one wall and its noise costs more than this.
-    let (_, s, t) = best.filter(|b| b.0 < 0.6)?;
+    let (_, s, t) = best.filter(|b| b.0 < most_cost)?;
     Some([0, s, t].map(|i| (clusters[i].center, clusters[i].count as f64 / normals.len() as f64)))
 }
 
 /// Mean shift over all frames' axes, then the nearest rotation to the three heaviest orthogonal modes.
-fn combine(axes: &[(Vector, f64)], up: &Vector, bandwidth: f64) -> Option<[Vector; 3]> {
+fn combine(axes: &[(Vector, f64)], up: &Vector, bandwidth: f64, orthogonal_deg: f64) -> Option<[Vector; 3]> {
     let modes = mean_shift(axes, bandwidth);
     let first = modes.first()?.axis;
-    // Within 15 degrees of orthogonal: the rest is another structure.
-    let orthogonal = |a: &Vector, b: &Vector| a.dot(b).abs() < 15f64.to_radians().sin();
+    // The rest is another structure.
+    let orthogonal = |a: &Vector, b: &Vector| a.dot(b).abs() < orthogonal_deg.to_radians().sin();
     let second = modes.iter().find(|m| orthogonal(&m.axis, &first))?.axis;
     let third = modes
         .iter()
@@ -244,25 +247,42 @@ mod tests {
         let up = rotation(&Vector::x(), 0.02) * Vector::z();
         for yaw in [0.0, 0.4, 0.78, 1.3] {
             let normals = room(yaw, 0.26);
-            let found = refine(heading(&normals, &up).unwrap(), &normals, &up);
+            let found = refine(
+                heading(&normals, &up, &config::RoomFrame::default()).unwrap(),
+                &normals,
+                &up,
+                &config::RoomFrame::default(),
+            );
             assert!(worst(&found, yaw).to_degrees() < 1.0, "{}", worst(&found, yaw).to_degrees());
             assert!(found[2].z > 0.99 && (found[0].cross(&found[1]) - found[2]).norm() < 1e-9);
         }
         let exact = room(0.4, 1e-4);
-        assert!(worst(&refine(heading(&exact, &up).unwrap(), &exact, &up), 0.4).to_degrees() < 0.1);
-        assert!(heading(&vec![Vector::z(); 500], &up).is_none());
+        assert!(
+            worst(
+                &refine(
+                    heading(&exact, &up, &config::RoomFrame::default()).unwrap(),
+                    &exact,
+                    &up,
+                    &config::RoomFrame::default()
+                ),
+                0.4
+            )
+            .to_degrees()
+                < 0.1
+        );
+        assert!(heading(&vec![Vector::z(); 500], &up, &config::RoomFrame::default()).is_none());
     }
 
     #[test]
     fn the_papers_clusters_find_a_room_in_little_noise() {
         let normals = room(0.4, 0.05);
-        let triple = frame_triple(&normals, 6).unwrap();
-        let found = combine(&triple, &Vector::z(), 12f64.to_radians()).unwrap();
+        let triple = frame_triple(&normals, 6, 0.6).unwrap();
+        let found = combine(&triple, &Vector::z(), 12f64.to_radians(), 15.0).unwrap();
         assert!(worst(&found, 0.4).to_degrees() < 3.0, "{}", worst(&found, 0.4).to_degrees());
     }
 
     #[test]
     fn one_wall_gives_no_frame() {
-        assert!(frame_triple(&vec![Vector::z(); 500], 6).is_none());
+        assert!(frame_triple(&vec![Vector::z(); 500], 6, 0.6).is_none());
     }
 }

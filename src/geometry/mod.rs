@@ -1,19 +1,16 @@
 //! Static geometry: 3D lines for hinges, directions for slides, and the touched front face (§3.2, algorithm 1, §A.4, §A.5).
 
-pub mod ajar;
+pub mod alignment;
 pub mod candidates;
 pub mod depth_scale;
 pub mod detector;
+pub mod directed;
 pub mod face;
-pub mod front;
-mod leaf;
+pub mod fronts;
+mod line_track;
 pub mod manhattan;
-pub mod moved;
-pub mod openings;
-pub mod outline;
-mod rays;
+mod segment2;
 pub mod segments;
-pub mod sights;
 pub mod tracks;
 mod triangulation;
 

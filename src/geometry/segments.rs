@@ -1,54 +1,13 @@
 //! 2D line segments of a view and their lift into the world with depth (§3.2).
 
-use serde::{Deserialize, Serialize};
-
 use super::detector;
+pub use super::segment2::Segment2;
 use crate::config::{self, LineMethod};
 use crate::error::Result;
 use crate::math::line::{Line, Segment};
 use crate::math::ransac::{Search, lo_ransac};
 use crate::math::{Point, Vector, centroid, principal_directions, stats, unit};
 use crate::recording::{Grid, HAND_CLASS, Recording};
-
-/// A segment in an image, pixels.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Segment2 {
-    /// One end (u, v).
-    pub a: [f64; 2],
-    /// The other end.
-    pub b: [f64; 2],
-}
-
-impl Segment2 {
-    /// Length in pixels.
-    #[must_use]
-    pub fn length(&self) -> f64 {
-        (self.b[0] - self.a[0]).hypot(self.b[1] - self.a[1])
-    }
-
-    /// The point at share `t` of the way from `a` to `b`.
-    #[must_use]
-    pub fn at(&self, t: f64) -> [f64; 2] {
-        [0, 1].map(|k| self.a[k] + (self.b[k] - self.a[k]) * t)
-    }
-
-    /// Distance of a point, pixels; beyond the ends it is that of the end.
-    #[must_use]
-    pub fn distance(&self, p: [f64; 2]) -> f64 {
-        let [du, dv] = [self.b[0] - self.a[0], self.b[1] - self.a[1]];
-        let along = (p[0] - self.a[0]) * du + (p[1] - self.a[1]) * dv;
-        let t = (along / (du * du + dv * dv).max(1e-12)).clamp(0.0, 1.0);
-        let foot = self.at(t);
-        (p[0] - foot[0]).hypot(p[1] - foot[1])
-    }
-
-    /// Unit vector across the segment.
-    #[must_use]
-    pub fn across(&self) -> [f64; 2] {
-        let length = self.length().max(1e-9);
-        [-(self.b[1] - self.a[1]) / length, (self.b[0] - self.a[0]) / length]
-    }
-}
 
 /// Whatever finds line segments in a grey image.
 pub trait LineDetector: Sync {
@@ -97,6 +56,65 @@ impl LiftedSegment {
     }
 }
 
+/// A 2D segment of one view with the plane that it spans with its camera: all that a view without depth tells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SeenSegment {
+    /// Frame index.
+    pub view: usize,
+    /// The segment in the image.
+    pub image: Segment2,
+    /// Camera centre, world.
+    pub eye: Point,
+    /// From the camera centre to the two ends, world, unit.
+    pub rays: [Vector; 2],
+    /// Unit normal of the plane through the camera centre and the segment, world.
+    pub plane: Vector,
+}
+
+/// Segments of one frame without depth; of its own detector's or in the image, as in [`lift`].
+///
+/// # Errors
+/// Images and files of segments that cannot be read.
+pub fn seen(
+    recording: &Recording,
+    frame: usize,
+    detector: &dyn LineDetector,
+    config: &config::Geometry,
+) -> Result<Vec<SeenSegment>> {
+    let mask = recording.mask(frame)?;
+    let Some(at) = recording.frames.get(frame) else { return Ok(Vec::new()) };
+    let camera = recording.camera_of(frame);
+    let ray = |p: [f64; 2]| unit(&(at.world_from_camera.rotation * camera.unproject(p[0], p[1], 1.0).coords));
+    let found = in_image(recording, frame, mask.as_ref(), detector, config)?;
+    Ok(found
+        .into_iter()
+        .filter_map(|image| {
+            let rays = [ray(image.a)?, ray(image.b)?];
+            let plane = unit(&rays[0].cross(&rays[1]))?;
+            Some(SeenSegment { view: frame, image, eye: at.center(), rays, plane })
+        })
+        .collect())
+}
+
+/// Segments in the image of one frame that are long enough and no hand's.
+fn in_image(
+    recording: &Recording,
+    frame: usize,
+    mask: Option<&Grid<u8>>,
+    detector: &dyn LineDetector,
+    config: &config::Geometry,
+) -> Result<Vec<Segment2>> {
+    let mut found: Vec<Segment2> = match recording.segments(frame)? {
+        Some(ends) => ends.into_iter().map(|[a, b]| Segment2 { a, b }).collect(),
+        None => match recording.grey(frame)? {
+            Some(grey) => detector.detect(&grey, config.min_segment_px),
+            None => Vec::new(),
+        },
+    };
+    found.retain(|image| image.length() >= config.min_segment_px && !on_hand(image, mask, &config.segments));
+    Ok(found)
+}
+
 /// Segments of one frame, lifted with its depth as read: its own detector's where the recording has them, else what
 /// `detector` finds in the image; none where the frame has neither.
 pub fn lift(
@@ -108,19 +126,13 @@ pub fn lift(
     config: &config::Geometry,
     seed: u64,
 ) -> Result<Vec<LiftedSegment>> {
-    let found = match recording.segments(frame)? {
-        Some(ends) => ends.into_iter().map(|[a, b]| Segment2 { a, b }).collect(),
-        None => match recording.grey(frame)? {
-            Some(grey) => detector.detect(&grey, config.min_segment_px),
-            None => return Ok(Vec::new()),
-        },
-    };
+    let found = in_image(recording, frame, mask, detector, config)?;
     let pose = &recording.frames[frame].world_from_camera;
     let eye = recording.frames[frame].center();
-    let ray = |p: [f64; 2]| pose.rotation * recording.camera.unproject(p[0], p[1], 1.0).coords;
+    let camera = recording.camera_of(frame);
+    let ray = |p: [f64; 2]| pose.rotation * camera.unproject(p[0], p[1], 1.0).coords;
     let lifted = found
         .into_iter()
-        .filter(|image| image.length() >= config.min_segment_px && !on_hand(image, mask))
         .filter_map(|image| {
             let plane = unit(&ray(image.a).cross(&ray(image.b)))?;
             let (segment, samples) = match config.lines {
@@ -131,7 +143,7 @@ pub fn lift(
                     (segment, samples.into_iter().filter(near).collect())
                 }
                 LineMethod::Triangulated => {
-                    let [start, end] = inverse_depth(&image, depth, config.samples_per_segment)?;
+                    let [start, end] = inverse_depth(&image, depth, config.samples_per_segment, &config.segments)?;
                     let at = |p: [f64; 2], w: f64| eye + ray(p) / w;
                     (Segment::between(&at(image.a, start), &at(image.b, end))?, Vec::new())
                 }
@@ -143,15 +155,14 @@ pub fn lift(
 }
 
 /// Whether more than a fifth of a segment runs along or over a hand.
-fn on_hand(segment: &Segment2, mask: Option<&Grid<u8>>) -> bool {
+fn on_hand(segment: &Segment2, mask: Option<&Grid<u8>>, rules: &config::SegmentRules) -> bool {
+    let margin = rules.hand_margin_px;
     let Some(mask) = mask else { return false };
-    // An edge between a hand and what is behind it lies a pixel or two beside the hand's mask.
-    const MARGIN_PX: f64 = 3.0;
     let across = segment.across();
     let hits = (0..=20)
         .filter(|i| {
             let [u, v] = segment.at(f64::from(*i) / 20.0);
-            [-MARGIN_PX, 0.0, MARGIN_PX]
+            [-margin, 0.0, margin]
                 .iter()
                 .any(|s| mask.nearest(u + across[0] * s, v + across[1] * s) == Some(HAND_CLASS))
         })
@@ -163,14 +174,17 @@ fn on_hand(segment: &Segment2, mask: Option<&Grid<u8>>) -> bool {
 ///
 /// At an edge of furniture half of the pixels belong to the background, and estimated depth smears the step over a few
 /// pixels; the edge is the nearer surface's. Along a straight line in space inverse depth is linear in the image.
-fn inverse_depth(segment: &Segment2, depth: &Grid<f32>, count: usize) -> Option<[f64; 2]> {
-    /// Where each side is sampled, pixels from the segment for an image 640 wide: beyond the smear of a depth edge.
-    const SIDE_PX: [f64; 3] = [2.5, 4.0, 5.5];
+fn inverse_depth(
+    segment: &Segment2,
+    depth: &Grid<f32>,
+    count: usize,
+    rules: &config::SegmentRules,
+) -> Option<[f64; 2]> {
     let across = segment.across();
     let scale = (depth.width as f64 / 640.0).max(1.0);
     let side = |sign: f64| -> Option<[f64; 2]> {
         let samples: Vec<[f64; 2]> = (0..count)
-            .flat_map(|i| SIDE_PX.map(|s| ((i as f64 + 0.5) / count as f64, sign * s * scale)))
+            .flat_map(|i| rules.side_px.map(|s| ((i as f64 + 0.5) / count as f64, sign * s * scale)))
             .filter_map(|(t, s)| {
                 let [u, v] = segment.at(t);
                 let z = f64::from(depth.nearest(u + across[0] * s, v + across[1] * s)?);
@@ -178,16 +192,16 @@ fn inverse_depth(segment: &Segment2, depth: &Grid<f32>, count: usize) -> Option<
             })
             .collect();
         // Mostly holes: a line through what is left would be a guess.
-        if 2 * samples.len() < count * SIDE_PX.len() {
+        if 2 * samples.len() < count * rules.side_px.len() {
             return None;
         }
-        robust_ends(&samples)
+        robust_ends(&samples, rules.depth_std)
     };
     match (side(-1.0), side(1.0)) {
         (Some(a), Some(b)) => {
             let middle = |e: &[f64; 2]| 0.5 * (e[0] + e[1]);
-            // Two boards that meet, or one face left and right of a seam: within 3 % of the distance.
-            if (middle(&a) - middle(&b)).abs() < 0.03 * middle(&a) {
+            // Two boards that meet, or one face left and right of a seam.
+            if (middle(&a) - middle(&b)).abs() < rules.one_surface * middle(&a) {
                 Some([0, 1].map(|k| 0.5 * (a[k] + b[k])))
             } else {
                 Some(if middle(&a) > middle(&b) { a } else { b })
@@ -195,16 +209,16 @@ fn inverse_depth(segment: &Segment2, depth: &Grid<f32>, count: usize) -> Option<
         }
         (a, b) => a.or(b),
     }
-    .filter(|e| e.iter().all(|w| *w > 0.02))
+    .filter(|e| e.iter().all(|w| *w > rules.least_inverse_depth))
 }
 
 /// Values at 0 and 1 of the line through (t, value), by reweighted least squares about its median: a few samples may lie on
 /// another surface. `None` where less than half agree.
-fn robust_ends(samples: &[[f64; 2]]) -> Option<[f64; 2]> {
+fn robust_ends(samples: &[[f64; 2]], depth_std: f64) -> Option<[f64; 2]> {
     let values: Vec<f64> = samples.iter().map(|s| s[1]).collect();
     let start = stats::median(&values)?;
-    // Depth noise of 1.5 % of the distance, as in inverse depth.
-    let spread = 0.015 * start;
+    // As in inverse depth.
+    let spread = depth_std * start;
     let (mut offset, mut slope) = (start, 0.0);
     for round in 0..6 {
         // Wide at first: the line's own slope is not yet known.
@@ -232,11 +246,12 @@ fn robust_ends(samples: &[[f64; 2]]) -> Option<[f64; 2]> {
 /// World points along a segment as its own pixels' depth has them: the paper's unprojection.
 fn unproject(recording: &Recording, frame: usize, segment: &Segment2, depth: &Grid<f32>, count: usize) -> Vec<Point> {
     let pose = &recording.frames[frame].world_from_camera;
+    let camera = recording.camera_of(frame);
     (0..count)
         .filter_map(|i| {
             let [u, v] = segment.at((i as f64 + 0.5) / count as f64);
             let z = f64::from(depth.nearest(u, v)?);
-            (z > 0.0 && z.is_finite()).then(|| pose * recording.camera.unproject(u, v, z))
+            (z > 0.0 && z.is_finite()).then(|| pose * camera.unproject(u, v, z))
         })
         .collect()
 }
@@ -255,7 +270,10 @@ pub fn fit_segment(points: &[Point], config: &config::Geometry, seed: u64) -> Op
         return None;
     }
     let coordinates: Vec<f64> = found.inliers.iter().map(|&i| found.model.coordinate(&points[i])).collect();
-    let span = [stats::quantile(&coordinates, 0.05)?, stats::quantile(&coordinates, 0.95)?];
+    let span = [
+        stats::quantile(&coordinates, config.segments.rim_share)?,
+        stats::quantile(&coordinates, 1.0 - config.segments.rim_share)?,
+    ];
     (span[1] - span[0] > 1e-3).then_some(Segment { line: found.model, span })
 }
 
@@ -300,7 +318,7 @@ mod tests {
             }
         }
         let edge = Segment2 { a: [320.0, 100.0], b: [320.0, 380.0] };
-        let [start, end] = inverse_depth(&edge, &depth, 24).unwrap();
+        let [start, end] = inverse_depth(&edge, &depth, 24, &config::SegmentRules::default()).unwrap();
         assert!((start - 0.85).abs() < 2e-3 && (end - 0.99).abs() < 2e-3, "{start} {end}");
     }
 

@@ -8,38 +8,16 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 
 use nalgebra::Matrix3;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
+pub use super::line_track::LineTrack;
+use super::line_track::best_first;
 use super::segments::{LiftedSegment, fit_segment};
-use super::triangulation::{DEPTH_STD, DETECTION_STD_PX, POSE_STD_M, span_on, triangulate, views_of};
+use super::triangulation::{span_on, triangulate, views_of};
 use crate::config;
 use crate::localization::{Region, voxels};
 use crate::math::line::Segment;
 use crate::math::{Point, unsigned_angle};
 use crate::recording::Recording;
-
-/// A 3D line seen in several views: a candidate hinge.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct LineTrack {
-    /// The line with its ends.
-    pub segment: Segment,
-    /// Frames that see it, ascending.
-    pub views: Vec<usize>,
-    /// Root mean square distance of what supports it, metres.
-    pub rms_m: f64,
-    /// Covariance of its middle, across the line (rank 2), world, m^2.
-    pub position_covariance: Matrix3<f64>,
-    /// Covariance of its unit direction (rank 2), world.
-    pub direction_covariance: Matrix3<f64>,
-}
-
-impl LineTrack {
-    /// Largest standard deviation of its middle across the line, metres.
-    #[must_use]
-    pub fn position_std_m(&self) -> f64 {
-        self.position_covariance.trace().max(0.0).sqrt()
-    }
-}
 
 /// Lines that run along the region, cut to the stretch that does. Best supported first.
 #[must_use]
@@ -121,7 +99,7 @@ pub fn unprojected(lifted: &[&LiftedSegment], region: &Region, config: &config::
             // The points of a view share their errors: as many independent ones as there are views.
             let across = Matrix3::identity() - segment.line.direction * segment.line.direction.transpose();
             let position_covariance = across * (0.5 * variance / views.len() as f64);
-            let lever = (segment.length() / 12f64.sqrt()).max(0.02);
+            let lever = (segment.length() / 12f64.sqrt()).max(config.tracks.least_lever_m);
             let direction_covariance = position_covariance / (lever * lever);
             Some(LineTrack { segment, views, rms_m: variance.sqrt(), position_covariance, direction_covariance })
         })
@@ -142,28 +120,23 @@ pub fn triangulated(
     let mut left: Vec<&LiftedSegment> = lifted.to_vec();
     // Depth groups coarsely: of two edges a few centimetres apart the better seen one wins a group, and what it leaves
     // makes a group of its own in the next round.
-    for _ in 0..3 {
+    for _ in 0..config.tracks.rounds {
         let fresh: Vec<LineTrack> =
             groups(&left, config).par_iter().filter_map(|m| triangulate(recording, m, config, seed)).collect();
         if fresh.is_empty() {
             break;
         }
         tracks.extend(fresh);
-        tracks = merged(tracks);
-        let (assigned, rest) = assign(recording, &left, &tracks);
+        tracks = merged(tracks, &config.tracks);
+        let (assigned, rest) = assign(recording, &left, &tracks, &config.tracks);
         let settled: Vec<LineTrack> =
             assigned.par_iter().filter_map(|m| triangulate(recording, m, config, seed)).collect();
         // A track that lost its members to a neighbour keeps what earlier rounds gave it.
-        tracks = merged(tracks.into_iter().chain(settled).collect());
+        tracks = merged(tracks.into_iter().chain(settled).collect(), &config.tracks);
         left = rest;
     }
     best_first(&mut tracks);
     tracks
-}
-
-fn best_first(tracks: &mut [LineTrack]) {
-    let support = |t: &LineTrack| t.views.len() as f64 * t.segment.length();
-    tracks.sort_by(|a, b| support(b).total_cmp(&support(a)).then(a.views.cmp(&b.views)));
 }
 
 /// A grid of the places that segments run through.
@@ -172,7 +145,7 @@ struct Places {
 }
 
 impl Places {
-    /// About the reach of a comparison: a segment is looked for in its own cell and the ones around it.
+    /// Numerics: about the reach of a comparison: a segment is looked for in its own cell and the ones around it.
     const CELL_M: f64 = 0.2;
 
     fn add(&mut self, id: usize, segment: &Segment) {
@@ -228,8 +201,6 @@ fn groups<'a>(lifted: &[&'a LiftedSegment], config: &config::Geometry) -> Vec<Ve
 
 /// Whether two lifted segments can be one line: near in angle and distance, and overlapping or nearly so.
 fn same_line(a: &Segment, b: &Segment, config: &config::Geometry) -> bool {
-    // A line broken by a hand or a glare leaves a gap; a wider one is another edge.
-    const GAP_M: f64 = 0.1;
     if unsigned_angle(&a.line.direction, &b.line.direction) > config.track_angle_deg.to_radians() {
         return false;
     }
@@ -240,7 +211,7 @@ fn same_line(a: &Segment, b: &Segment, config: &config::Geometry) -> bool {
     let coordinates = ends.map(|p| a.line.coordinate(&p));
     let low = coordinates[0].min(coordinates[1]);
     let high = coordinates[0].max(coordinates[1]);
-    low <= a.span[1] + GAP_M && high >= a.span[0] - GAP_M
+    low <= a.span[1] + config.tracks.gap_m && high >= a.span[0] - config.tracks.gap_m
 }
 
 /// Gives each segment to the track that its image shows best: by the track's projection into its view. Returns the members
@@ -249,6 +220,7 @@ fn assign<'a>(
     recording: &Recording,
     lifted: &[&'a LiftedSegment],
     tracks: &[LineTrack],
+    rules: &config::Tracks,
 ) -> (Vec<Vec<&'a LiftedSegment>>, Vec<&'a LiftedSegment>) {
     let mut places = Places { cells: HashMap::new() };
     for (i, track) in tracks.iter().enumerate() {
@@ -264,7 +236,7 @@ fn assign<'a>(
         let best = near
             .iter()
             .filter_map(|&t| {
-                let cost = misfit(recording, &inverses[&segment.view], segment, &tracks[t as usize])?;
+                let cost = misfit(recording, &inverses[&segment.view], segment, &tracks[t as usize], rules)?;
                 Some((cost, t))
             })
             .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -282,24 +254,24 @@ fn misfit(
     camera_from_world: &crate::math::Pose,
     segment: &LiftedSegment,
     track: &LineTrack,
+    rules: &config::Tracks,
 ) -> Option<f64> {
-    // Twice what detection and poses are good to, as an angle: a board's two edges are further apart.
-    const ANGLE_RAD: f64 = 0.07;
     let direction = &track.segment.line.direction;
-    if unsigned_angle(direction, &segment.segment.line.direction) > 0.35 {
+    if unsigned_angle(direction, &segment.segment.line.direction) > rules.assigned_turn_rad {
         return None;
     }
     let middle = segment.segment.middle();
     let range = (middle - segment.eye).norm();
-    let tolerance = 2.0 * (range * DETECTION_STD_PX / recording.camera.fx).hypot(POSE_STD_M);
+    let tolerance =
+        2.0 * (range * rules.detection_std_px / recording.camera_of(segment.view).fx).hypot(rules.pose_std_m);
     let across = segment.plane.dot(&(track.segment.line.point - segment.eye)).abs();
     let turn = segment.plane.dot(direction).abs();
-    if turn > ANGLE_RAD + 1.7 * tolerance / segment.segment.length().max(0.03) {
+    if turn > rules.assigned_rad + 1.7 * tolerance / segment.segment.length().max(rules.least_length_m) {
         return None;
     }
     // The track's point nearest to the segment lies in the viewing plane, on the segment's stretch, and about as far away.
     let [low, high] = span_on(&track.segment.line, segment)?;
-    if low > track.segment.span[1] + 0.05 || high < track.segment.span[0] - 0.05 {
+    if low > track.segment.span[1] + rules.beyond_m || high < track.segment.span[0] - rules.beyond_m {
         return None;
     }
     let at = (0.5 * (low + high)).clamp(track.segment.span[0], track.segment.span[1]);
@@ -307,16 +279,14 @@ fn misfit(
     let off = segment.plane.dot(&(p - segment.eye)).abs().min(across.max(0.0));
     let local = camera_from_world * p;
     let depth = (local.z - (camera_from_world * middle).z).abs();
-    if off > tolerance || depth > 0.03 + 2.0 * DEPTH_STD * range {
+    if off > tolerance || depth > rules.depth_slack_m + 2.0 * rules.depth_std * range {
         return None;
     }
-    Some(off / tolerance + turn / ANGLE_RAD + depth / range)
+    Some(off / tolerance + turn / rules.assigned_rad + depth / range)
 }
 
 /// Of tracks that are one line the best supported one is kept, with the views of all.
-fn merged(mut tracks: Vec<LineTrack>) -> Vec<LineTrack> {
-    const ANGLE_RAD: f64 = 0.06;
-    const APART_M: f64 = 0.012;
+fn merged(mut tracks: Vec<LineTrack>, rules: &config::Tracks) -> Vec<LineTrack> {
     best_first(&mut tracks);
     let mut places = Places { cells: HashMap::new() };
     let mut kept: Vec<LineTrack> = Vec::new();
@@ -326,9 +296,9 @@ fn merged(mut tracks: Vec<LineTrack>) -> Vec<LineTrack> {
         let twin = near.iter().find(|&&k| {
             let other = &kept[k as usize].segment;
             let at = other.line.coordinate(&track.segment.middle());
-            unsigned_angle(&other.line.direction, &track.segment.line.direction) < ANGLE_RAD
-                && other.line.distance(&track.segment.middle()) < APART_M
-                && (other.span[0] - 0.05..other.span[1] + 0.05).contains(&at)
+            unsigned_angle(&other.line.direction, &track.segment.line.direction) < rules.one_rad
+                && other.line.distance(&track.segment.middle()) < rules.one_m
+                && (other.span[0] - rules.beyond_m..other.span[1] + rules.beyond_m).contains(&at)
         });
         match twin {
             Some(&k) => {
@@ -350,7 +320,7 @@ fn merged(mut tracks: Vec<LineTrack>) -> Vec<LineTrack> {
 mod tests {
     use super::*;
     use crate::math::{Pose, Vector};
-    use crate::recording::{Camera, DepthFactors, Frame};
+    use crate::recording::{Camera, Frame};
 
     fn camera() -> Camera {
         Camera { width: 640, height: 480, fx: 400.0, fy: 400.0, cx: 319.5, cy: 239.5 }
@@ -367,17 +337,7 @@ mod tests {
                 Frame { timestamp_secs: f64::from(i), world_from_camera, files: Default::default() }
             })
             .collect();
-        Recording {
-            name: String::new(),
-            dir: std::path::PathBuf::new(),
-            camera: camera(),
-            frames,
-            clips: Vec::new(),
-            hands: Vec::new(),
-            labels: Default::default(),
-            reconstruction: Vec::new(),
-            depth_factors: DepthFactors::default(),
-        }
+        Recording { frames, ..Recording::empty(camera()) }
     }
 
     /// What each view makes of an edge: exact in the image, its depth off by a share of its own.

@@ -2,20 +2,13 @@
 
 use nalgebra::{Matrix2, Matrix3, SymmetricEigen};
 
+use super::line_track::LineTrack;
 use super::segments::LiftedSegment;
-use super::tracks::LineTrack;
 use crate::config;
 use crate::math::line::{Line, Segment};
 use crate::math::ransac::{Search, lo_ransac};
 use crate::math::{Point, Vector, any_orthogonal, reject, unit};
 use crate::recording::Recording;
-
-/// Standard deviation of a detected line in the image, pixels, ends included.
-pub(super) const DETECTION_STD_PX: f64 = 1.0;
-/// Standard deviation of a camera's place, metres: what poses of head-worn cameras are good to.
-pub(super) const POSE_STD_M: f64 = 0.004;
-/// Standard deviation of depth along the ray, as a share of the distance, once its scale is corrected.
-pub(super) const DEPTH_STD: f64 = 0.03;
 
 /// What one view says about a line.
 pub(super) struct Sight {
@@ -29,18 +22,18 @@ pub(super) struct Sight {
 }
 
 impl Sight {
-    fn new(recording: &Recording, member: &LiftedSegment) -> Self {
+    fn new(recording: &Recording, member: &LiftedSegment, rules: &config::Tracks) -> Self {
         let middle = member.segment.middle();
         let range = (middle - member.eye).norm();
-        let across = (range * DETECTION_STD_PX / recording.camera.fx).hypot(POSE_STD_M);
-        let length = member.segment.length().max(0.03);
-        let depth = DEPTH_STD * range;
+        let across = (range * rules.detection_std_px / recording.camera_of(member.view).fx).hypot(rules.pose_std_m);
+        let length = member.segment.length().max(rules.least_length_m);
+        let depth = rules.depth_std * range;
         Self {
             plane: member.plane,
             eye: member.eye,
             middle,
             along: member.segment.line.direction,
-            // Both ends are off independently: the direction by sqrt(12)/2 of it over the length.
+            // Arithmetic: both ends are off independently, the direction by sqrt(12)/2 of it over the length.
             std: [across, 1.7 * across / length, depth, 1.7 * depth / length],
         }
     }
@@ -92,17 +85,13 @@ pub(super) fn triangulate(
     config: &config::Geometry,
     seed: u64,
 ) -> Option<LineTrack> {
-    /// A sight within this many standard deviations belongs to the line.
-    const TOLERANCE: f64 = 3.0;
-    /// Two planes that differ by less have no usable line in common (2 degrees).
-    const LEAST_SINE: f64 = 0.035;
     if views_of(members).len() < config.min_track_views {
         return None;
     }
-    let sights: Vec<Sight> = members.iter().map(|m| Sight::new(recording, m)).collect();
+    let sights: Vec<Sight> = members.iter().map(|m| Sight::new(recording, m, &config.tracks)).collect();
     let pair = |ids: &[usize; 2]| -> Option<Line> {
         let [a, b] = ids.map(|i| &sights[i]);
-        if a.plane.cross(&b.plane).norm() < LEAST_SINE {
+        if a.plane.cross(&b.plane).norm() < config.tracks.least_sine {
             // Seen from one direction only: depth has to help.
             return common_line(&sights, ids).map(|(line, _)| line);
         }
@@ -116,7 +105,7 @@ pub(super) fn triangulate(
     let draws = config.line_draws.min(sights.len() * (sights.len() - 1));
     let found = lo_ransac::<Line, 2>(
         sights.len(),
-        Search { draws, tolerance: TOLERANCE, seed },
+        Search { draws, tolerance: config.tracks.tolerance, seed },
         pair,
         |ids| common_line(&sights, ids).map(|(line, _)| line),
         |line, i| sights[i].misfit(line),
@@ -163,7 +152,7 @@ pub(super) fn span_on(line: &Line, member: &LiftedSegment) -> Option<[f64; 2]> {
         let ray = unit(&(end - member.eye))?;
         let cosine = ray.dot(&line.direction);
         let rest = 1.0 - cosine * cosine;
-        // Seen end on, a line shows no length.
+        // Geometry: seen end on, within 10 degrees, a line shows no length.
         if rest < 0.03 {
             return None;
         }
@@ -183,8 +172,10 @@ pub(super) fn common_span(spans: &[[f64; 2]]) -> Option<[f64; 2]> {
         values.sort_by(f64::total_cmp);
         values.get(rank).map(|v| sign * v)
     };
+    /// Geometry: a shorter stretch is a point, metres.
+    const LEAST_M: f64 = 0.02;
     let span = [end(0, 1.0)?, end(1, -1.0)?];
-    (span[1] - span[0] > 0.02).then_some(span)
+    (span[1] - span[0] > LEAST_M).then_some(span)
 }
 
 pub(super) fn views_of(members: &[&LiftedSegment]) -> Vec<usize> {

@@ -1,94 +1,96 @@
 //! Interactions in a recording in which nobody said when they are: a hand takes hold, moves along a line or an arc, lets go, and
-//! what is around has changed.
+//! what is around has changed. Without depth the motion and flags alone tell, which asks for more of them and is less sure.
 
 use rayon::prelude::*;
 
-use super::contact::motion;
 use super::contact::view::View;
-use super::contact::{Widths, between, lasts};
+use super::contact::{Flags, Widths, between, lasts};
+use super::contact::{alone, motion};
 use crate::config;
 use crate::math::{Point, stats};
 use crate::recording::{Clip, Recording, Side};
-
-/// Interactions last no longer than this, seconds.
-const LONGEST_SECS: f64 = 6.0;
-/// A hand that is not seen for longer may have let go, seconds.
-const GAP_SECS: f64 = 1.0;
-/// Samples of a hand are taken at most this often, seconds: twelve a second follow any hand.
-const SAMPLE_SECS: f64 = 0.08;
-/// What is opened moves by at least this, metres, and by three times what hands tremble.
-const LEAST_MOVE_M: f64 = 0.06;
-/// Frames at this distance in time are looked at for how things stand, seconds; so far away from a moment at the most.
-const VIEW_SECS: f64 = 0.4;
-const VIEWS_WITHIN_SECS: f64 = 6.0;
-/// Views that are asked before and after a moment.
-const VIEWS: usize = 2;
-/// A view counts only where no hand is nearer to the place than this, metres.
-const HANDS_AWAY_M: f64 = 0.35;
-/// An interaction needs this much evidence, nats: odds of fifty to one.
-const ENOUGH_NATS: f64 = 4.0;
-/// Ends at which a hand surely does not rest are not tried, nats.
-const UNREST_NATS: f64 = -2.0;
-/// Fingertips are about this far from what they hold, and it varies by so much, metres: estimated hands, estimated depth.
-const HELD_AT_M: f64 = 0.05;
-const HELD_STD_M: f64 = 0.04;
-/// What a clip shows beside the hold itself, seconds: reaching and withdrawing.
-const AROUND_SECS: f64 = 0.5;
-/// Two interactions share no more than this of the shorter one: two hands at one part are one interaction.
-const SHARED: f64 = 0.25;
 
 /// Clips of all interactions that open or close something, in time order; of words they have "open" and "close" at most, where
 /// one takes back what another did.
 /// A frame that cannot be decoded tells nothing here; the pipeline names it.
 #[must_use]
 pub fn interactions(recording: &Recording, config: &config::Hands) -> Vec<Clip> {
-    let mut walks: Vec<Walk> = [Side::Right, Side::Left].iter().map(|side| Walk::of(recording, *side)).collect();
-    let tremble = motion::tremble_m(walks.iter().map(|w| (w.times.as_slice(), w.places.as_slice())));
+    let rules = &config.found;
+    let mut walks: Vec<Walk> = [Side::Right, Side::Left].iter().map(|side| Walk::of(recording, *side, rules)).collect();
+    let tremble = motion::tremble_m(walks.iter().map(|w| (w.times.as_slice(), w.places.as_slice())), config);
     distances_now(recording, &mut walks, config);
-    distances_still(recording, &mut walks);
+    distances_still(recording, &mut walks, config);
+    let by_motion = with_depth(recording).is_empty().then_some(config.found_by_motion_nats);
     let mut candidates: Vec<Candidate> =
-        walks.iter().enumerate().flat_map(|(w, walk)| walk.candidates(w, tremble)).collect();
+        walks.iter().enumerate().flat_map(|(w, walk)| walk.candidates(w, tremble, by_motion, config)).collect();
     candidates
         .sort_by(|a, b| b.nats.total_cmp(&a.nats).then((a.walk, a.first, a.last).cmp(&(b.walk, b.first, b.last))));
     let mut chosen: Vec<Candidate> = Vec::new();
     for candidate in candidates {
-        let [from, to] = candidate.times(&walks);
-        let free = chosen.iter().all(|other| {
-            let [a, b] = other.times(&walks);
-            to.min(b) - from.max(a) <= SHARED * (to - from).min(b - a)
-        });
-        if free {
+        if chosen.iter().all(|other| candidate.is_another_than(other, &walks, rules)) {
             chosen.push(candidate);
         }
     }
-    let changed: Vec<bool> = chosen.par_iter().map(|c| something_changed(recording, &walks, c)).collect();
-    let mut moves: Vec<Move> =
-        chosen.iter().zip(changed).filter(|(_, changed)| *changed).map(|(c, _)| walks[c.walk].moved(c)).collect();
+    let temperature = (config.correlation_secs / rules.sample_secs).max(1.0);
+    let seen: Vec<f64> = chosen.par_iter().map(|c| changed_nats(recording, &walks, c, config)).collect();
+    let mut likely: Vec<(Candidate, f64)> = Vec::new();
+    for (candidate, seen) in chosen.into_iter().zip(seen) {
+        // Of two hands at work at once one holds and one goes along, unless both are seen to have changed something.
+        let alone = likely.iter().all(|(other, theirs)| {
+            other.walk == candidate.walk || !candidate.overlaps(other, &walks, rules) || (seen > 0.0 && *theirs > 0.0)
+        });
+        let is_enough = by_motion.is_some() || candidate.nats / temperature + seen > rules.enough_nats;
+        if alone && is_enough {
+            likely.push((candidate, seen));
+        }
+    }
+    let mut moves: Vec<Move> = likely.iter().map(|(c, _)| walks[c.walk].moved(c, config)).collect();
     moves.sort_by_key(|m| m.frames);
-    clips(recording, &moves)
+    let moves = in_one_go(recording, &moves, rules);
+    clips(recording, &moves, rules)
 }
 
 /// A found interaction.
 #[derive(Debug, Clone, Copy)]
 struct Move {
+    /// The hand.
+    walk: usize,
     /// First and last frame of the hold.
     frames: [usize; 2],
     /// Where the hand is there.
     ends: [Point; 2],
 }
 
+/// Moves in time order; what went on where it had stopped a moment before, and the same way, is one.
+fn in_one_go(recording: &Recording, moves: &[Move], rules: &config::Found) -> Vec<Move> {
+    let time = |f: usize| recording.frames[f].timestamp_secs;
+    let mut joined: Vec<Move> = Vec::new();
+    for next in moves {
+        let goes_on = joined.iter_mut().rfind(|last| last.walk == next.walk).filter(|last| {
+            let (a, b) = (last.ends[1] - last.ends[0], next.ends[1] - next.ends[0]);
+            time(next.frames[0]) - time(last.frames[1]) <= rules.pause_secs
+                && (next.ends[0] - last.ends[1]).norm() <= rules.pause_m
+                // A door turns by less than a right angle in each go.
+                && a.dot(&b) > 0.0
+        });
+        match goes_on {
+            Some(last) => (last.frames[1], last.ends[1]) = (next.frames[1], next.ends[1]),
+            None => joined.push(*next),
+        }
+    }
+    joined
+}
+
 /// Which of two moves of one part opens it: the one that a later one takes back. Empty where a move has no counterpart.
-fn verbs(moves: &[Move]) -> Vec<&'static str> {
-    /// Hands take hold of one handle within this, metres, at the open end; at the closed end, which both reach, too.
-    const SAME_M: f64 = 0.2;
+fn verbs(moves: &[Move], rules: &config::Found) -> Vec<&'static str> {
     let mut verbs = vec![""; moves.len()];
     for later in 0..moves.len() {
         // The last one that stands open: what is closed twice was opened in between.
         let back = (0..later).rev().find(|&earlier| {
             let (a, b) = (&moves[earlier], &moves[later]);
             let length = (a.ends[1] - a.ends[0]).norm().max((b.ends[1] - b.ends[0]).norm());
-            let reversed = (a.ends[1] - a.ends[0]).dot(&(b.ends[1] - b.ends[0])) < -0.25 * length * length;
-            let near = (a.ends[1] - b.ends[0]).norm() < SAME_M;
+            let reversed = (a.ends[1] - a.ends[0]).dot(&(b.ends[1] - b.ends[0])) < -rules.back_share * length * length;
+            let near = (a.ends[1] - b.ends[0]).norm() < rules.same_m;
             verbs[earlier] != "close" && near && reversed
         });
         if let Some(earlier) = back {
@@ -99,17 +101,17 @@ fn verbs(moves: &[Move]) -> Vec<&'static str> {
 }
 
 /// Clips around holds; neighbours share no frame.
-fn clips(recording: &Recording, moves: &[Move]) -> Vec<Clip> {
+fn clips(recording: &Recording, moves: &[Move], rules: &config::Found) -> Vec<Clip> {
     let holds: Vec<[usize; 2]> = moves.iter().map(|m| m.frames).collect();
-    let verbs = verbs(moves);
+    let verbs = verbs(moves, rules);
     let time = |f: usize| recording.frames[f].timestamp_secs;
     (0..holds.len())
         .map(|i| {
             let [first, last] = holds[i];
             let floor = i.checked_sub(1).map_or(0, |j| holds[j][1].midpoint(first).max(holds[j][1]) + 1).min(first);
             let ceiling = holds.get(i + 1).map_or(recording.frames.len() - 1, |next| last.midpoint(next[0])).max(last);
-            let start_frame = (floor..=first).find(|&f| time(first) - time(f) <= AROUND_SECS).unwrap_or(first);
-            let end_frame = (last..=ceiling).rev().find(|&f| time(f) - time(last) <= AROUND_SECS).unwrap_or(last);
+            let start_frame = (floor..=first).find(|&f| time(first) - time(f) <= rules.around_secs).unwrap_or(first);
+            let end_frame = (last..=ceiling).rev().find(|&f| time(f) - time(last) <= rules.around_secs).unwrap_or(last);
             let verb = verbs[i].to_owned();
             Clip {
                 clip: format!("found_{i:03}"),
@@ -132,6 +134,8 @@ struct Walk {
     now: Vec<Option<f64>>,
     before: Vec<Option<f64>>,
     after: Vec<Option<f64>>,
+    /// What a detector said of contact.
+    flags: Vec<Option<bool>>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -143,13 +147,35 @@ struct Candidate {
 }
 
 impl Candidate {
+    /// Whether both can be interactions: one hand holds one thing at a time, and two hands that go one way are at one part.
+    fn is_another_than(&self, other: &Self, walks: &[Walk], rules: &config::Found) -> bool {
+        let way = |c: &Self| walks[c.walk].places[c.last] - walks[c.walk].places[c.first];
+        let (one, two) = (way(self), way(other));
+        let together = (one - two).norm() < rules.together_share * one.norm().max(two.norm());
+        match self.walk == other.walk {
+            true => self.shared_secs(other, walks) <= 0.0,
+            false => !self.overlaps(other, walks, rules) || !together,
+        }
+    }
+
+    /// Seconds that two share; below 0 the time between them.
+    fn shared_secs(&self, other: &Self, walks: &[Walk]) -> f64 {
+        let ([from, to], [a, b]) = (self.times(walks), other.times(walks));
+        to.min(b) - from.max(a)
+    }
+
+    fn overlaps(&self, other: &Self, walks: &[Walk], rules: &config::Found) -> bool {
+        let secs = |c: &Self| c.times(walks)[1] - c.times(walks)[0];
+        self.shared_secs(other, walks) > rules.shared * secs(self).min(secs(other))
+    }
+
     fn times(&self, walks: &[Walk]) -> [f64; 2] {
         [self.first, self.last].map(|i| walks[self.walk].times[i])
     }
 }
 
 impl Walk {
-    fn of(recording: &Recording, side: Side) -> Self {
+    fn of(recording: &Recording, side: Side, rules: &config::Found) -> Self {
         let mut due = f64::NEG_INFINITY;
         let samples: Vec<_> = recording
             .hands
@@ -159,7 +185,7 @@ impl Walk {
                 let time = recording.frames[s.frame].timestamp_secs;
                 let taken = time >= due - 1e-6;
                 if taken {
-                    due = time + SAMPLE_SECS;
+                    due = time + rules.sample_secs;
                 }
                 taken
             })
@@ -172,53 +198,86 @@ impl Walk {
             now: vec![None; n],
             before: vec![None; n],
             after: vec![None; n],
+            flags: samples.iter().map(|s| s.contact).collect(),
         }
     }
 
-    fn moved(&self, candidate: &Candidate) -> Move {
-        let calm = motion::calmed(&self.times, &self.places);
+    fn moved(&self, candidate: &Candidate, config: &config::Hands) -> Move {
+        let calm = motion::calmed(&self.times, &self.places, config);
         let ends = [candidate.first, candidate.last];
-        Move { frames: ends.map(|i| self.frames[i]), ends: ends.map(|i| calm[i]) }
+        Move { walk: candidate.walk, frames: ends.map(|i| self.frames[i]), ends: ends.map(|i| calm[i]) }
     }
 
-    /// All pairs of a start and an end of a hold for which enough speaks.
-    fn candidates(&self, walk: usize, tremble_m: f64) -> Vec<Candidate> {
-        let widths = Widths { mean: HELD_AT_M, std: HELD_STD_M, between: 0.0, by_clip: Vec::new() };
-        let rests = motion::rests(&self.times, &self.places, tremble_m);
-        let stretches = motion::stretches(&self.times, &self.places);
-        let calm = motion::calmed(&self.times, &self.places);
+    /// Whether the hand was elsewhere right before the one sample and right after the other, as it is around a hold: one that
+    /// reaches begins where it was at rest.
+    fn comes_and_goes(&self, first: usize, last: usize, rules: &config::Found) -> bool {
+        let away = |from: usize, i: usize| (self.places[i] - self.places[from]).norm() >= rules.elsewhere_m;
+        (0..first)
+            .rev()
+            .take_while(|&i| self.times[first] - self.times[i] <= rules.elsewhere_within_secs)
+            .any(|i| away(first, i))
+            && (last + 1..self.times.len())
+                .take_while(|&i| self.times[i] - self.times[last] <= rules.elsewhere_within_secs)
+                .any(|i| away(last, i))
+    }
+
+    /// All pairs of a start and an end of a hold for which enough speaks: `by_motion`, nats, where nothing is seen around the
+    /// hand. Flags speak there alone, as depth tells more.
+    fn candidates(
+        &self,
+        walk: usize,
+        tremble_m: f64,
+        by_motion: Option<f64>,
+        config: &config::Hands,
+    ) -> Vec<Candidate> {
+        let (rules, contact) = (&config.found, &config.contact);
+        let widths = Widths { mean: rules.held_at_m, std: rules.held_std_m, between: 0.0, by_clip: Vec::new() };
+        let rests = motion::rests(&self.times, &self.places, tremble_m, config);
+        let stretches = motion::stretches(&self.times, &self.places, config);
+        let calm = motion::calmed(&self.times, &self.places, config);
         let mut sums = vec![0.0];
-        for now in &self.now {
-            sums.push(sums[sums.len() - 1] + widths.nats(0, *now));
+        let flags = by_motion.map_or_else(Flags::default, |_| Flags::unknown(config));
+        for (now, flag) in self.now.iter().zip(&self.flags) {
+            sums.push(sums[sums.len() - 1] + widths.nats(0, *now, contact) + flags.nats(*flag, config));
         }
-        let least = LEAST_MOVE_M.max(3.0 * tremble_m);
+        let flagged = self.flags.iter().any(Option::is_some);
+        let least = rules.least_move_m.max(rules.least_trembles * tremble_m);
         let n = self.times.len();
         (0..n)
             .into_par_iter()
-            .filter(|&i| rests[i][0] >= UNREST_NATS)
+            .filter(|&i| rests[i][0] >= -rules.unrest_nats)
             .flat_map_iter(|i| {
                 let mut found = Vec::new();
-                let begin = widths.nats(0, self.before[i]) + rests[i][0] - sums[i];
+                let begin = widths.nats(0, self.before[i], contact) + rests[i][0] - sums[i];
                 let mut farthest = 0.0f64;
                 for j in i + 1..n {
                     let secs = self.times[j] - self.times[i];
-                    let torn = self.times[j] - self.times[j - 1] > GAP_SECS || stretches[j] != stretches[i];
-                    if secs > LONGEST_SECS || torn {
+                    let torn = self.times[j] - self.times[j - 1] > rules.gap_secs || stretches[j] != stretches[i];
+                    if secs > rules.longest_secs || torn {
                         break;
                     }
                     let moved = (calm[j] - calm[i]).norm();
                     farthest = farthest.max(moved);
                     // The way there, not there and back: that is two interactions.
-                    if rests[j][1] < UNREST_NATS || moved < least || moved < 0.65 * farthest {
+                    if rests[j][1] < -rules.unrest_nats || moved < least || moved < rules.one_way_share * farthest {
                         continue;
                     }
-                    let nats = begin + sums[j + 1] + widths.nats(0, self.after[j]) + rests[j][1] + lasts(secs);
+                    let nats = begin
+                        + sums[j + 1]
+                        + widths.nats(0, self.after[j], contact)
+                        + rests[j][1]
+                        + lasts(secs, contact);
                     // Most of what is far below stays below with the path, too, whose fit is what takes time.
-                    if nats <= -5.0 {
+                    if nats <= -rules.hopeless_nats {
                         continue;
                     }
-                    let nats = nats + motion::path_nats(&self.places[i..=j], tremble_m);
-                    if nats > ENOUGH_NATS {
+                    let (path, enough) = match by_motion {
+                        Some(enough) => (alone::along(&self.places[i..=j], tremble_m, config), enough),
+                        None => (motion::path_nats(&self.places[i..=j], tremble_m, config), rules.held_nats),
+                    };
+                    let nats = nats + path;
+                    let is_hold = by_motion.is_none() || flagged || self.comes_and_goes(i, j, rules);
+                    if nats > enough && is_hold {
                         found.push(Candidate { walk, first: i, last: j, nats });
                     }
                 }
@@ -228,19 +287,33 @@ impl Walk {
     }
 }
 
-/// Distances in the frames with hands, every so often; in between they are interpolated.
-fn distances_now(recording: &Recording, walks: &mut [Walk], config: &config::Hands) {
+/// Frames whose depth [`interactions`] asks, in no order. Images are not read.
+#[must_use]
+pub fn frames(recording: &Recording, config: &config::Hands) -> Vec<usize> {
+    let walks = [Side::Right, Side::Left].map(|side| Walk::of(recording, side, &config.found));
+    let mut all = now_frames(recording, &walks, config);
+    all.extend(spaced(recording, with_depth(recording), config.found.view_secs));
+    all
+}
+
+/// Frames with hands, every so often.
+fn now_frames(recording: &Recording, walks: &[Walk], config: &config::Hands) -> Vec<usize> {
     let mut frames: Vec<usize> = walks.iter().flat_map(|w| w.frames.iter().copied()).collect();
     frames.sort_unstable();
     frames.dedup();
-    let frames = spaced(recording, frames, config.contact_every_secs);
+    spaced(recording, frames, config.contact_every_secs)
+}
+
+/// Distances in the frames with hands, every so often; in between they are interpolated.
+fn distances_now(recording: &Recording, walks: &mut [Walk], config: &config::Hands) {
+    let frames = now_frames(recording, walks, config);
     let seen: Vec<Vec<Option<f64>>> = frames
         .par_iter()
         .map(|&frame| {
-            let view = view(recording, frame);
+            let view = view(recording, frame, config);
             let distance = |walk: &Walk| {
                 let at = walk.frames.binary_search(&frame).ok()?;
-                view.as_ref()?.nearest_m(&walk.places[at])
+                view.as_ref()?.nearest_m(&walk.places[at], &config.contact)
             };
             walks.iter().map(distance).collect()
         })
@@ -251,19 +324,19 @@ fn distances_now(recording: &Recording, walks: &mut [Walk], config: &config::Han
                 walk.now[at] = seen[w];
             }
         }
-        walk.now = between(&walk.times, &walk.now, 2.5 * config.contact_every_secs);
+        walk.now = between(&walk.times, &walk.now, config.contact.between_looks * config.contact_every_secs);
     }
 }
 
 /// Distances to what stood at each sample's place before the hand came and after it left: each view is decoded once.
-fn distances_still(recording: &Recording, walks: &mut [Walk]) {
-    let views = spaced(recording, with_depth(recording), VIEW_SECS);
+fn distances_still(recording: &Recording, walks: &mut [Walk], config: &config::Hands) {
+    let views = spaced(recording, with_depth(recording), config.found.view_secs);
     // View, walk, sample, before or after.
     let mut asked: Vec<(usize, usize, usize, bool)> = Vec::new();
     for (w, walk) in walks.iter().enumerate() {
         for (i, (place, time)) in walk.places.iter().zip(&walk.times).enumerate() {
             for before in [true, false] {
-                let near = still_views(recording, &views, place, *time, before);
+                let near = still_views(recording, &views, place, (*time, before), &config.found);
                 asked.extend(near.into_iter().map(|view| (view, w, i, before)));
             }
         }
@@ -273,8 +346,8 @@ fn distances_still(recording: &Recording, walks: &mut [Walk]) {
     let answers: Vec<Vec<Option<f64>>> = groups
         .par_iter()
         .map(|group| {
-            let view = view(recording, group[0].0);
-            group.iter().map(|(_, w, i, _)| view.as_ref()?.nearest_m(&walks[*w].places[*i])).collect()
+            let view = view(recording, group[0].0, config);
+            group.iter().map(|(_, w, i, _)| view.as_ref()?.nearest_m(&walks[*w].places[*i], &config.contact)).collect()
         })
         .collect();
     let mut sums: Vec<Vec<[(f64, f64); 2]>> = walks.iter().map(|w| vec![[(0.0, 0.0); 2]; w.frames.len()]).collect();
@@ -293,8 +366,8 @@ fn distances_still(recording: &Recording, walks: &mut [Walk]) {
     }
 }
 
-fn view(recording: &Recording, frame: usize) -> Option<View<'_>> {
-    View::of(recording, frame).ok().flatten()
+fn view<'a>(recording: &'a Recording, frame: usize, config: &config::Hands) -> Option<View<'a>> {
+    View::of(recording, frame, &config.contact).ok().flatten()
 }
 
 fn with_depth(recording: &Recording) -> Vec<usize> {
@@ -318,52 +391,50 @@ fn spaced(recording: &Recording, frames: Vec<usize>, secs: f64) -> Vec<usize> {
 }
 
 /// The nearest views before or after a moment that show a place without a hand near it.
-fn still_views(recording: &Recording, views: &[usize], place: &Point, time: f64, before: bool) -> Vec<usize> {
-    /// What is this near in time is the moment itself.
-    const NOW_SECS: f64 = 0.2;
+fn still_views(
+    recording: &Recording,
+    views: &[usize],
+    place: &Point,
+    (time, before): (f64, bool),
+    rules: &config::Found,
+) -> Vec<usize> {
     let at = |f: usize| recording.frames[f].timestamp_secs;
     let shows = |f: &&usize| {
         let local = recording.frames[**f].world_from_camera.inverse() * place;
-        let pixel = recording.camera.project(&local).filter(|_| local.z > 0.1);
-        let seen = pixel.is_some_and(|(u, v)| recording.camera.contains(u, v));
+        let camera = recording.camera_of(**f);
+        let pixel = camera.project(&local).filter(|_| local.z > rules.nearest_m);
+        let seen = pixel.is_some_and(|(u, v)| camera.contains(u, v));
         let hands = recording.hands_in(**f, **f);
-        seen && hands.iter().all(|h| (h.grasp() - place).norm() >= HANDS_AWAY_M)
+        seen && hands.iter().all(|h| (h.grasp() - place).norm() >= rules.hands_away_m)
     };
     if before {
-        let end = views.partition_point(|&f| at(f) < time - NOW_SECS);
-        let near = views[..end].iter().rev().take_while(|f| time - at(**f) <= VIEWS_WITHIN_SECS);
-        near.filter(shows).take(VIEWS).copied().collect()
+        let end = views.partition_point(|&f| at(f) < time - rules.now_secs);
+        let near = views[..end].iter().rev().take_while(|f| time - at(**f) <= rules.views_within_secs);
+        near.filter(shows).take(rules.views).copied().collect()
     } else {
-        let start = views.partition_point(|&f| at(f) <= time + NOW_SECS);
-        let near = views[start..].iter().take_while(|f| at(**f) - time <= VIEWS_WITHIN_SECS);
-        near.filter(shows).take(VIEWS).copied().collect()
+        let start = views.partition_point(|&f| at(f) <= time + rules.now_secs);
+        let near = views[start..].iter().take_while(|f| at(**f) - time <= rules.views_within_secs);
+        near.filter(shows).take(rules.views).copied().collect()
     }
 }
 
-/// Whether depth around the way of a hand is another after than before; also where nobody can tell.
-fn something_changed(recording: &Recording, walks: &[Walk], candidate: &Candidate) -> bool {
-    /// Surfaces so near to the ends of the way are compared, metres, beside the way's own length.
-    const AROUND_M: f64 = 0.35;
-    /// They have changed where they are off by this, metres, and by four times what the frames' depth is off.
-    const CHANGED_M: f64 = 0.06;
-    /// Share of what both frames see that has to have changed.
-    const CHANGED_SHARE: f64 = 0.05;
-    /// Fewer common samples tell nothing.
-    const LEAST_SAMPLES: usize = 60;
+/// What depth around the way of a hand says, which is another after something was opened: log odds; 0 where nobody can tell.
+fn changed_nats(recording: &Recording, walks: &[Walk], candidate: &Candidate, config: &config::Hands) -> f64 {
+    let rules = &config.found;
     let walk = &walks[candidate.walk];
     let [a, b] = [candidate.first, candidate.last].map(|i| walk.places[i]);
     let [from, to] = candidate.times(walks);
-    let views = spaced(recording, with_depth(recording), VIEW_SECS);
+    let views = spaced(recording, with_depth(recording), rules.view_secs);
     let middle = nalgebra::center(&a, &b);
-    let reach = AROUND_M + (b - a).norm();
-    let before = still_views(recording, &views, &middle, from, true);
-    let after = still_views(recording, &views, &middle, to, false);
+    let reach = rules.changed_around_m + (b - a).norm();
+    let before = still_views(recording, &views, &middle, (from, true), rules);
+    let after = still_views(recording, &views, &middle, (to, false), rules);
     let mut shares = Vec::new();
     for &x in &before {
         for &y in &after {
-            let (Some(x), Some(y)) = (view(recording, x), view(recording, y)) else { continue };
+            let (Some(x), Some(y)) = (view(recording, x, config), view(recording, y, config)) else { continue };
             for (one, other) in [(&x, &y), (&y, &x)] {
-                let off = one.depth_against(other, &middle, reach);
+                let off = one.depth_against(other, &middle, reach, rules.changed_step_m);
                 // A frame's depth is off by a factor of its own.
                 let Some(factor) = stats::median(&off.iter().map(|(seen, there)| seen / there).collect::<Vec<_>>())
                 else {
@@ -371,14 +442,18 @@ fn something_changed(recording: &Recording, walks: &[Walk], candidate: &Candidat
                 };
                 let errors: Vec<f64> = off.iter().map(|(seen, there)| (seen / factor - there).abs()).collect();
                 let noise = stats::median(&errors).unwrap_or(0.0);
-                if errors.len() >= LEAST_SAMPLES {
-                    let limit = CHANGED_M.max(4.0 * 1.4826 * noise);
+                if errors.len() >= rules.changed_samples {
+                    let limit = rules.changed_m.max(rules.changed_stds * stats::NORMAL_PER_MEDIAN * noise);
                     shares.push(errors.iter().filter(|e| **e > limit).count() as f64 / errors.len() as f64);
                 }
             }
         }
     }
-    stats::median(&shares).is_none_or(|share| share >= CHANGED_SHARE)
+    let [openings, others] = [rules.changed_openings, rules.changed_others];
+    stats::median(&shares).map_or(0.0, |share| match share >= rules.changed_share {
+        true => f64::ln(openings / others),
+        false => f64::ln((1.0 - openings) / (1.0 - others)),
+    })
 }
 
 #[cfg(test)]
@@ -386,7 +461,7 @@ mod tests {
     use super::*;
 
     fn moved(from: [f64; 3], to: [f64; 3]) -> Move {
-        Move { frames: [0, 0], ends: [Point::from(from), Point::from(to)] }
+        Move { walk: 0, frames: [0, 0], ends: [Point::from(from), Point::from(to)] }
     }
 
     #[test]
@@ -394,12 +469,12 @@ mod tests {
         let drawer = moved([0.0, 0.0, 1.0], [0.4, 0.0, 1.0]);
         let other = moved([2.0, 0.0, 1.0], [2.0, 0.3, 1.0]);
         let back = moved([0.38, 0.05, 1.0], [0.02, 0.0, 1.0]);
-        assert_eq!(verbs(&[drawer, other, back]), ["open", "", "close"]);
-        assert_eq!(verbs(&[drawer, back, drawer, back]), ["open", "close", "open", "close"]);
+        assert_eq!(verbs(&[drawer, other, back], &config::Found::default()), ["open", "", "close"]);
+        assert_eq!(verbs(&[drawer, back, drawer, back], &config::Found::default()), ["open", "close", "open", "close"]);
         // In two goes: both open.
         let further = moved([0.4, 0.0, 1.0], [0.6, 0.0, 1.0]);
-        assert_eq!(verbs(&[drawer, further]), ["", ""]);
+        assert_eq!(verbs(&[drawer, further], &config::Found::default()), ["", ""]);
         // Of two openings in a row the later one is taken back.
-        assert_eq!(verbs(&[drawer, drawer, back]), ["", "open", "close"]);
+        assert_eq!(verbs(&[drawer, drawer, back], &config::Found::default()), ["", "open", "close"]);
     }
 }

@@ -2,6 +2,7 @@
 
 pub mod contact;
 pub mod find;
+pub mod timeline;
 
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -67,7 +68,7 @@ impl Trajectory {
     /// # Errors
     /// The first fault, in words.
     pub fn check(&self) -> Result<(), String> {
-        // Farther than around the world: an overflow, which would spoil every sum that it is part of.
+        /// Format: metres; farther than around the world is an overflow, which would spoil every sum that it is part of.
         const MAX_M: f64 = 1e8;
         if self.samples.is_empty() {
             return Err("no samples".to_owned());
@@ -163,7 +164,7 @@ pub fn trajectory(
                 // Detectors miss contacts more often than people narrate what they do not touch.
                 0 if config.contact_from_words && reading.names_furniture() => samples,
                 0 => Vec::new(),
-                _ => grown(recording, &around, first, last),
+                _ => grown(recording, &around, [first, last], config.gap_secs),
             };
             (score, side, held)
         })
@@ -178,8 +179,6 @@ pub fn trajectory(
         };
         return Outcome::Abstained(format!("{none} in contact ({in_clip} seen in the clip)"));
     };
-    // A blink of the detector; a hand takes as long to reach a handle.
-    const SEEN_SECS: f64 = 0.35;
     // Without a flag the samples are the narration's, which knows neither end.
     let ends_seen = if hold.is_none() && (!flagged || (use_contact && score == 0)) {
         [false; 2]
@@ -188,8 +187,8 @@ pub fn trajectory(
         let all = samples_of(side, from.saturating_sub(1), to + 1);
         let (first, last) = (held[0], held[held.len() - 1]);
         [
-            all.iter().any(|s| s.frame < first.frame && time(first) - time(s) <= SEEN_SECS),
-            all.iter().any(|s| s.frame > last.frame && time(s) - time(last) <= SEEN_SECS),
+            all.iter().any(|s| s.frame < first.frame && time(first) - time(s) <= config.seen_secs),
+            all.iter().any(|s| s.frame > last.frame && time(s) - time(last) <= config.seen_secs),
         ]
     };
     let times: Vec<f64> = held.iter().map(|s| recording.frames[s.frame].timestamp_secs).collect();
@@ -265,9 +264,12 @@ fn widened(recording: &Recording, clip: &Clip, secs: f64) -> [usize; 2] {
 
 /// A stretch of contact that began inside the narration goes on as long as the flags say so: narrations are shifted by
 /// about a second. Each side takes the extension of the largest sum (+1 in contact, -1 not), and stops at a gap.
-fn grown<'a>(recording: &Recording, around: &[&'a HandSample], first: usize, last: usize) -> Vec<&'a HandSample> {
-    // A hand that is not seen for longer may have let go.
-    const GAP_SECS: f64 = 0.5;
+fn grown<'a>(
+    recording: &Recording,
+    around: &[&'a HandSample],
+    [first, last]: [usize; 2],
+    gap_secs: f64,
+) -> Vec<&'a HandSample> {
     let time = |s: &HandSample| recording.frames[s.frame].timestamp_secs;
     let (Some(start), Some(end)) =
         (around.iter().position(|s| s.frame >= first), around.iter().rposition(|s| s.frame <= last))
@@ -277,7 +279,7 @@ fn grown<'a>(recording: &Recording, around: &[&'a HandSample], first: usize, las
     let reach = |order: &mut dyn Iterator<Item = usize>, from: usize| -> usize {
         let (mut best, mut best_sum, mut sum, mut last) = (from, 0i64, 0i64, from);
         for i in order {
-            if (time(around[i]) - time(around[last])).abs() > GAP_SECS {
+            if (time(around[i]) - time(around[last])).abs() > gap_secs {
                 break;
             }
             sum += if around[i].contact == Some(true) { 1 } else { -1 };
@@ -358,15 +360,16 @@ mod tests {
             noun: String::new(),
         };
         let recording = Recording {
-            name: String::new(),
-            dir: std::path::PathBuf::new(),
-            camera: crate::recording::Camera { width: 64, height: 48, fx: 50.0, fy: 50.0, cx: 31.5, cy: 23.5 },
             frames: frames.collect(),
-            clips: Vec::new(),
             hands: (0..6).map(hand).collect(),
-            labels: Default::default(),
-            reconstruction: Vec::new(),
-            depth_factors: Default::default(),
+            ..Recording::empty(crate::recording::Camera {
+                width: 64,
+                height: 48,
+                fx: 50.0,
+                fy: 50.0,
+                cx: 31.5,
+                cy: 23.5,
+            })
         };
         let follow = |narration: &str, config: &config::Hands| {
             let clip = clip(narration);

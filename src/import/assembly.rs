@@ -1,14 +1,18 @@
 //! Captures to one recording.
 
+use std::collections::BTreeMap;
+
 use super::axes::Convention;
-use super::imported::{Frame, Imported};
-use super::report::{NEEDED, Report, SourceReport, UNMET, source_name};
-use super::timeline::{self, Timeline};
-use super::view::View;
-use super::{Capture, Options, people, world};
+use super::capture::Capture;
+use super::choices::ImportOptions;
+use super::frame_timeline::{self, FrameTimeline};
+use super::imported::{Imported, ImportedFrame};
+use super::output_view::OutputView;
+use super::report::{ImportReport, NEEDED, SPARSE, SourceReport, UNMET, source_name};
+use super::{hands_and_clips, world_placement};
 use crate::error::{Error, Result};
 use crate::math::{Point, Pose, Vector};
-use crate::recording::HAND_CLASS;
+use crate::recording::{HAND_CLASS, reconstruction};
 
 /// Points of a reconstruction that are kept: those of a large house at 2 cm.
 const MAX_POINTS: usize = 2_000_000;
@@ -18,66 +22,40 @@ const MAX_POINTS: usize = 2_000_000;
 ///
 /// # Errors
 /// Where nothing can be placed: no poses, no intrinsics, no frame with a pose, a scale that nothing tells.
-pub fn assemble(captures: Vec<Capture>, options: &Options) -> Result<Imported> {
-    let mut report = Report { sources: captures.iter().map(SourceReport::of).collect(), ..Report::default() };
-    let timeline = timeline::build(&captures, options, &mut report)?;
-    let place = world::place(&captures, &timeline, options, &mut report)?;
+pub fn assemble(captures: Vec<Capture>, options: &ImportOptions) -> Result<Imported> {
+    let mut report = ImportReport {
+        sources: captures.iter().map(SourceReport::of).collect(),
+        dropped: captures.iter().flat_map(|c| c.dropped.iter().cloned()).collect(),
+        ..ImportReport::default()
+    };
+    let timeline = frame_timeline::build(&captures, options, &mut report)?;
+    let place = world_placement::place(&captures, &timeline, options, &mut report)?;
     let Some(first) = timeline.frames.first() else {
         return Err(Error::Config("import: no frame is left".to_owned()));
     };
-    let view = View::of(&first.optics, options);
-    let mut hands = people::hands(&captures, &timeline, &place, options, &mut report);
-    people::contacts(&captures, &timeline, &mut hands, &mut report);
-    let clips = people::clips(&captures, &timeline, &mut report);
+    let view = OutputView::of(&first.optics, options);
+    let mut hands = hands_and_clips::hands(&captures, &timeline, &place, options, &mut report);
+    hands_and_clips::contacts(&captures, &timeline, &mut hands, &mut report);
+    let clips = hands_and_clips::clips(&captures, &timeline, &mut report);
     let points = points(&captures, &timeline, &place, options, &mut report);
-    let depth_factor = world::depth_factor(&captures, &timeline, &place, options);
-    match depth_factor {
-        None => report
-            .dropped
-            .push("depth, whose unit is not metres and that no points of a reconstruction scale".to_owned()),
-        Some(factor) if factor != 1.0 => {
-            report.changes.push(format!("depth is multiplied by {factor:.5} to be metres"))
-        }
-        Some(_) => {}
-    }
+    let depth_factor = world_placement::depth_factor(&captures, &timeline, &place, options);
+    told_factor(depth_factor, &mut report);
     told_changes(&timeline, &view, options, &mut report);
-    let frames = timeline
-        .frames
-        .iter()
-        .map(|f| {
-            let turned = Pose::from_parts(Vector::zeros().into(), view.source_from_output);
-            Frame {
-                at: f.at.clone(),
-                time_secs: f.time_secs,
-                world_from_camera: place.pose(&f.world_from_camera) * turned,
-                source_pose: f.world_from_camera,
-                optics: f.optics,
-                image: f.image,
-                depth: f.depth.filter(|_| depth_factor.is_some()),
-                mask: f.mask,
-                normals: f.normals,
-                segments: f.segments,
-            }
-        })
-        .collect();
-    let mut labels =
-        captures.iter().filter_map(|c| c.masks.as_ref()).find(|m| !m.items.is_empty()).map(|m| m.labels.clone());
-    if let Some(labels) = &mut labels {
-        labels.entry(HAND_CLASS).or_insert_with(|| "hand".to_owned());
-    }
-    let pictures = timeline::video_pictures(&captures, &timeline.frames);
+    let frames = frames(&timeline, &place, &view, depth_factor.is_some());
+    let labels = labels(&captures);
+    let pictures = frame_timeline::video_pictures(&captures, &timeline.frames);
     let mut imported = Imported {
         view,
         frames,
         clips,
         hands,
-        labels: labels.unwrap_or_default(),
+        labels,
         points,
         report,
         captures,
         depth_factor: depth_factor.unwrap_or(1.0),
         pictures,
-        extracted: std::collections::BTreeMap::new(),
+        extracted: BTreeMap::new(),
         options: options.clone(),
     };
     imported.report.missing = missing(&imported);
@@ -85,16 +63,63 @@ pub fn assemble(captures: Vec<Capture>, options: &Options) -> Result<Imported> {
     Ok(imported)
 }
 
+/// Tells what depth is multiplied by, or that it cannot be used.
+fn told_factor(factor: Option<f64>, report: &mut ImportReport) {
+    match factor {
+        None => report
+            .dropped
+            .push("depth, whose unit is not metres and that no points of a reconstruction scale".to_owned()),
+        Some(factor) if factor != 1.0 => {
+            report.changes.push(format!("depth is multiplied by {factor:.5} to be metres"));
+        }
+        Some(_) => {}
+    }
+}
+
+/// The frames of the result: the output's camera in the recording's world.
+fn frames(
+    timeline: &FrameTimeline,
+    place: &world_placement::WorldPlacement,
+    view: &OutputView,
+    has_depth: bool,
+) -> Vec<ImportedFrame> {
+    let turned = Pose::from_parts(Vector::zeros().into(), view.source_from_output);
+    let frames = timeline.frames.iter();
+    frames
+        .map(|f| ImportedFrame {
+            at: f.at.clone(),
+            time_secs: f.time_secs,
+            world_from_camera: place.pose(&f.world_from_camera) * turned,
+            source_pose: f.world_from_camera,
+            optics: f.optics,
+            image: f.image,
+            depth: f.depth.filter(|_| has_depth),
+            mask: f.mask,
+            normals: f.normals,
+            segments: f.segments,
+        })
+        .collect()
+}
+
+/// Names of the classes of the first source with masks, the hand's among them; empty without masks.
+fn labels(captures: &[Capture]) -> BTreeMap<u8, String> {
+    let masks = captures.iter().filter_map(|c| c.masks.as_ref()).find(|m| !m.items.is_empty());
+    let Some(masks) = masks else { return BTreeMap::new() };
+    let mut labels = masks.labels.clone();
+    labels.entry(HAND_CLASS).or_insert_with(|| "hand".to_owned());
+    labels
+}
+
 /// Points of the capture with the poses, else of the first one that has any, evenly thinned.
 fn points(
     captures: &[Capture],
-    timeline: &Timeline,
-    place: &world::Place,
-    options: &Options,
-    report: &mut Report,
+    timeline: &FrameTimeline,
+    place: &world_placement::WorldPlacement,
+    options: &ImportOptions,
+    report: &mut ImportReport,
 ) -> Vec<Point> {
     let Some(posed) = captures.get(timeline.posed) else { return Vec::new() };
-    let Some(capture) = world::with_points(captures, timeline.posed) else { return Vec::new() };
+    let Some(capture) = world_placement::with_points(captures, timeline.posed) else { return Vec::new() };
     if capture.poses.is_none() {
         report.changes.push(format!(
             "points of {} are taken to be in the world of {}, in its unit",
@@ -114,7 +139,7 @@ fn points(
 }
 
 /// What was done to every image.
-fn told_changes(timeline: &Timeline, view: &View, options: &Options, report: &mut Report) {
+fn told_changes(timeline: &FrameTimeline, view: &OutputView, options: &ImportOptions, report: &mut ImportReport) {
     let Some(first) = timeline.frames.first() else { return };
     let c = &view.camera;
     if !view.is_same(&first.optics) {
@@ -123,10 +148,10 @@ fn told_changes(timeline: &Timeline, view: &View, options: &Options, report: &mu
             first.optics.width,
             first.optics.height,
             match first.optics.lens {
-                super::optics::Lens::Pinhole => "pinhole",
-                super::optics::Lens::OpenCv { .. } => "OpenCV",
-                super::optics::Lens::Fisheye { .. } => "fisheye",
-                super::optics::Lens::FisheyeRadTanThinPrism { .. } => "FisheyeRadTanThinPrism",
+                super::optics::LensModel::Pinhole => "pinhole",
+                super::optics::LensModel::OpenCv { .. } => "OpenCV",
+                super::optics::LensModel::Fisheye { .. } => "fisheye",
+                super::optics::LensModel::FisheyeRadTanThinPrism { .. } => "FisheyeRadTanThinPrism",
             },
             c.width,
             c.height
@@ -147,7 +172,7 @@ fn told_changes(timeline: &Timeline, view: &View, options: &Options, report: &mu
 fn missing(imported: &Imported) -> Vec<super::capture::Missing> {
     let lacks = |what: &str| match what {
         "images" => imported.frames.iter().all(|f| f.image.is_none()),
-        "depth" => imported.frames.iter().all(|f| f.depth.is_none()) && imported.points.is_empty(),
+        "depth" => imported.frames.iter().all(|f| f.depth.is_none()) && !reconstruction::is_dense(&imported.points),
         "hands" => imported.hands.is_empty(),
         "contact" => !imported.hands.is_empty() && imported.hands.iter().all(|h| h.contact.is_none()),
         "clips" => imported.clips.is_empty(),
@@ -165,9 +190,10 @@ fn missing(imported: &Imported) -> Vec<super::capture::Missing> {
             continue;
         }
         let own = imported.captures.iter().flat_map(|c| &c.missing).find(|m| m.what == *what);
+        let has_points = *what == "depth" && !imported.points.is_empty();
         out.push(own.cloned().unwrap_or_else(|| super::capture::Missing {
             what: (*what).to_owned(),
-            why: (*why).to_owned(),
+            why: if has_points { SPARSE } else { *why }.to_owned(),
             command: (*command).to_owned(),
         }));
     }

@@ -5,8 +5,8 @@
 
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
 
-use super::Options;
-use super::capture::{CameraAxes, Capture, Direction, Poses, QuaternionOrder, RawPose, Turn, World};
+use super::capture::{CameraAxes, Capture, Direction, Poses, QuaternionOrder, RawPose, RawRotation, SourceWorld};
+use super::choices::ImportOptions;
 use crate::math::{Point, Pose, Vector, any_orthogonal, unit};
 
 /// How far a rotation in a file may be from one: the norm of a quaternion, the determinant of a matrix.
@@ -41,14 +41,14 @@ pub fn quaternion(values: [f64; 4], order: QuaternionOrder) -> Option<UnitQuater
     ((norm - 1.0).abs() <= ROTATION_SLACK).then(|| UnitQuaternion::from_quaternion(q))
 }
 
-fn turn_matrix(turn: &Turn, order: QuaternionOrder) -> Option<Matrix3<f64>> {
+fn turn_matrix(turn: &RawRotation, order: QuaternionOrder) -> Option<Matrix3<f64>> {
     match turn {
-        Turn::Quaternion(values) => Some(quaternion(*values, order)?.to_rotation_matrix().into_inner()),
-        Turn::AxisAngle(v) => {
+        RawRotation::Quaternion(values) => Some(quaternion(*values, order)?.to_rotation_matrix().into_inner()),
+        RawRotation::AxisAngle(v) => {
             let v = Vector::from(*v);
             v.norm().is_finite().then(|| UnitQuaternion::from_scaled_axis(v).to_rotation_matrix().into_inner())
         }
-        Turn::Matrix([a, b, c]) => {
+        RawRotation::Matrix([a, b, c]) => {
             let m = Matrix3::from_rows(&[
                 nalgebra::RowVector3::from_row_slice(a),
                 nalgebra::RowVector3::from_row_slice(b),
@@ -88,10 +88,10 @@ pub struct Convention {
 impl Convention {
     /// Of a capture.
     #[must_use]
-    pub fn of(capture: &Capture, options: &Options) -> Self {
+    pub fn of(capture: &Capture, options: &ImportOptions) -> Self {
         let none = Poses::default();
         let poses = capture.poses.as_ref().unwrap_or(&none);
-        let World { unit_m, left_handed, .. } = capture.world;
+        let SourceWorld { unit_m, left_handed, .. } = capture.world;
         Self {
             direction: options.poses.unwrap_or(poses.direction),
             axes: options.camera_axes.unwrap_or(poses.axes),
@@ -214,7 +214,7 @@ mod tests {
         assert!(near(&c.world_from_camera(&inverse).unwrap(), &pose));
 
         let q = pose.rotation.quaternion();
-        let wxyz = RawPose { turn: Turn::Quaternion([q.w, q.i, q.j, q.k]), ..plain };
+        let wxyz = RawPose { turn: RawRotation::Quaternion([q.w, q.i, q.j, q.k]), ..plain };
         let c = Convention { quaternion: QuaternionOrder::Wxyz, ..convention() };
         assert!(near(&c.world_from_camera(&wxyz).unwrap(), &pose));
 
@@ -247,7 +247,7 @@ mod tests {
         let unity = mirror * pose.rotation.to_rotation_matrix().into_inner() * camera_matrix(CameraAxes::Unity);
         let t = mirror * pose.translation.vector;
         let row = |i: usize| [unity[(i, 0)], unity[(i, 1)], unity[(i, 2)]];
-        let raw = RawPose { position: t.into(), turn: Turn::Matrix([row(0), row(1), row(2)]) };
+        let raw = RawPose { position: t.into(), turn: RawRotation::Matrix([row(0), row(1), row(2)]) };
         let c = Convention { axes: CameraAxes::Unity, left_handed: true, ..convention() };
         assert!(near(&c.world_from_camera(&raw).unwrap(), &pose));
         let p = Point::new(0.3, 0.2, 1.0);
@@ -260,10 +260,10 @@ mod tests {
     fn no_rotation_is_no_pose() {
         let c = convention();
         for turn in [
-            Turn::Quaternion([0.0; 4]),
-            Turn::Quaternion([f64::NAN, 0.0, 0.0, 1.0]),
-            Turn::Matrix([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]]),
-            Turn::Matrix([[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]]),
+            RawRotation::Quaternion([0.0; 4]),
+            RawRotation::Quaternion([f64::NAN, 0.0, 0.0, 1.0]),
+            RawRotation::Matrix([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]]),
+            RawRotation::Matrix([[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]]),
         ] {
             assert!(c.world_from_camera(&RawPose { position: [0.0; 3], turn }).is_none(), "{turn:?}");
         }

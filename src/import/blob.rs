@@ -5,12 +5,10 @@ use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
+pub use super::believable::MAX_BLOB_BYTES;
 use super::h5::Hdf5;
 pub use super::pack::Packing;
 use crate::error::{Error, Result};
-
-/// Above this no single image or array of a recording is believed: a 4K float depth image has 33 MB.
-pub const MAX_BLOB_BYTES: u64 = 256 << 20;
 
 /// Where the bytes of one item are.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -4,65 +4,16 @@
 //! and `axes`, `joints`, `decode` and `warp` act on what is told. So an option can overrule a declaration.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
+pub use super::at::At;
 use super::blob::Blob;
 use super::optics::Optics;
-pub use super::poses::{CameraAxes, Direction, PoseAt, Poses, QuaternionOrder, RawPose, Turn, World};
+pub use super::raw_poses::{CameraAxes, Direction, PoseAt, Poses, QuaternionOrder, RawPose, RawRotation, SourceWorld};
 use crate::math::{Point, Pose};
 use crate::recording::Side;
 use crate::recording::segments::Ends;
-
-/// Where in the recording an item belongs. A reader fills in all that it knows.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct At {
-    /// Seconds on the capture's clock.
-    pub time_secs: Option<f64>,
-    /// The image's file name without folder and ending.
-    pub name: Option<String>,
-    /// Frame of the video, from 0.
-    pub index: Option<usize>,
-}
-
-impl At {
-    /// At a time, seconds.
-    #[must_use]
-    pub fn time(secs: f64) -> Self {
-        Self { time_secs: Some(secs), ..Self::default() }
-    }
-
-    /// At a frame of the video, from 0.
-    #[must_use]
-    pub fn index(index: usize) -> Self {
-        Self { index: Some(index), ..Self::default() }
-    }
-
-    /// At an image, by its file name; folder and ending are left out.
-    #[must_use]
-    pub fn name(file: &str) -> Self {
-        let stem = Path::new(file).file_stem().map(|s| s.to_string_lossy().into_owned());
-        Self { name: stem, ..Self::default() }
-    }
-
-    /// The same so many seconds later.
-    #[must_use]
-    pub fn later(&self, secs: f64) -> Self {
-        Self { time_secs: self.time_secs.map(|t| t + secs), ..self.clone() }
-    }
-
-    /// The same with a frame of the video, from 0.
-    #[must_use]
-    pub fn with_index(self, index: usize) -> Self {
-        Self { index: Some(index), ..self }
-    }
-
-    /// The same with the name of an image.
-    #[must_use]
-    pub fn with_name(self, file: &str) -> Self {
-        Self { name: Self::name(file).name, ..self }
-    }
-}
 
 /// How the bytes of an image without a header stand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,7 +44,7 @@ pub enum PixelCoding {
 
 /// Where a picture's pixels are.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Picture {
+pub enum ImageSource {
     /// A JPEG or PNG, told by its content.
     Still(Blob),
     /// Pixels without a header.
@@ -124,7 +75,7 @@ pub struct ImageAt {
     /// When.
     pub at: At,
     /// What.
-    pub picture: Picture,
+    pub picture: ImageSource,
     /// Its camera where it differs from image to image.
     pub optics: Option<Optics>,
 }
@@ -273,7 +224,7 @@ pub struct HandAt {
     pub at: At,
     /// Which.
     pub side: Side,
-    /// Joints in the order of [`Hands::order`]; one that is not there is `None`.
+    /// Joints in the order of [`HandStream::order`]; one that is not there is `None`.
     pub joints: Vec<Option<[f64; 3]>>,
     /// Whether it holds or touches something; `None`: the source does not say.
     pub contact: Option<bool>,
@@ -283,12 +234,12 @@ pub struct HandAt {
 
 /// Hands.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Hands {
+pub struct HandStream {
     /// The joints' frame.
     pub frame: JointFrame,
     /// The joints' order.
-    pub order: super::joints::JointOrder,
-    /// Metres per unit of the joints, in the camera's and the body's frame. In the world's frame [`World::unit_m`] holds.
+    pub order: super::joint_orders::JointOrder,
+    /// Metres per unit of the joints, in the camera's and the body's frame. In the world's frame [`SourceWorld::unit_m`] holds.
     pub unit_m: f64,
     /// In any order.
     pub items: Vec<HandAt>,
@@ -418,10 +369,12 @@ pub struct Capture {
     pub licence: Option<String>,
     /// What a user should know: what the reader took for granted, what it left out.
     pub notes: Vec<String>,
+    /// What of the files could not be read and was left out while most could, with the reason: it is told.
+    pub dropped: Vec<String>,
     /// Name of the clock of all times; captures whose clocks have one name share it. `None`: a clock of its own.
     pub clock: Option<String>,
     /// The world's frame.
-    pub world: World,
+    pub world: SourceWorld,
     /// The colour camera.
     pub optics: Option<Optics>,
     /// Whether [`Capture::optics`] were guessed from images, so that any other source's come first.
@@ -433,7 +386,7 @@ pub struct Capture {
     /// Depth.
     pub depth: Option<Depth>,
     /// Hands.
-    pub hands: Option<Hands>,
+    pub hands: Option<HandStream>,
     /// Focal length that the hands (in the camera's frame) were placed with, as a share of the image's width, its principal
     /// point the image's middle; `None`: the camera's own. Hands are moved to where the camera's own focal length has them.
     pub hands_focal_per_width: Option<f64>,

@@ -4,96 +4,21 @@
 //! into the options that set it right. A hand's own size tells its unit.
 
 use nalgebra::Matrix3;
-use serde::Serialize;
 
 use super::axes::{Convention, upright};
-use super::capture::{CameraAxes, Capture, Direction, QuaternionOrder, RawPose, Turn};
-use super::joints::{PALM, TIPS};
-use super::{Imported, Options};
+use super::capture::{CameraAxes, Capture, Direction, QuaternionOrder, RawPose, RawRotation};
+use super::finding::{Change, ImportFinding};
+use super::imported::Imported;
+use super::joint_orders::{PALM, TIPS};
 use crate::math::{Point, Pose, Vector, stats};
 use crate::recording::conventions::{self, Fix, Reading, Subject, readings_of};
-
-/// Something that does not fit.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Finding {
-    /// What is probably wrong.
-    pub what: String,
-    /// The numbers that say so.
-    pub evidence: String,
-    /// The option that sets it right.
-    pub option: String,
-    /// Whether it is beyond doubt.
-    pub certain: bool,
-    /// Whether the option is beyond doubt, too.
-    #[serde(skip)]
-    pub can_be_fixed: bool,
-    /// The same options as changes; none where no option sets it right.
-    #[serde(skip)]
-    pub changes: Vec<Change>,
-}
-
-/// A change of one option.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Change {
-    /// `--poses`.
-    Poses(Direction),
-    /// `--quaternion`.
-    Quaternion(QuaternionOrder),
-    /// `--camera-axes`.
-    CameraAxes(CameraAxes),
-    /// `--unit`, metres.
-    Unit(f64),
-    /// `--scale`, metres a unit.
-    Scale(f64),
-    /// `--up`, an axis of the source.
-    Up(Vector),
-    /// `--hand-lag`, seconds.
-    HandLag(f64),
-}
-
-impl Change {
-    /// Changes the option.
-    pub fn apply(&self, options: &mut Options) {
-        match self {
-            Self::Poses(direction) => options.poses = Some(*direction),
-            Self::Quaternion(order) => options.quaternion = Some(*order),
-            Self::CameraAxes(axes) => options.camera_axes = Some(*axes),
-            Self::Unit(unit) => options.unit_m = Some(*unit),
-            Self::Scale(scale) => options.scale = Some(*scale),
-            Self::Up(up) => options.up = Some(*up),
-            Self::HandLag(secs) => options.hand_lag_secs = *secs,
-        }
-    }
-
-    /// As it is written on the command line.
-    #[must_use]
-    pub fn words(&self) -> String {
-        match self {
-            Self::Poses(Direction::WorldFromCamera) => "--poses world-from-camera".to_owned(),
-            Self::Poses(Direction::CameraFromWorld) => "--poses camera-from-world".to_owned(),
-            Self::Quaternion(QuaternionOrder::Xyzw) => "--quaternion xyzw".to_owned(),
-            Self::Quaternion(QuaternionOrder::Wxyz) => "--quaternion wxyz".to_owned(),
-            Self::CameraAxes(CameraAxes::Opencv) => "--camera-axes opencv".to_owned(),
-            Self::CameraAxes(CameraAxes::Opengl) => "--camera-axes opengl".to_owned(),
-            Self::CameraAxes(CameraAxes::Unity) => "--camera-axes unity".to_owned(),
-            Self::Unit(unit) => format!("--unit {unit:.4}"),
-            Self::Scale(scale) => format!("--scale {scale:.5}"),
-            Self::Up(up) => {
-                let at = up.iamax();
-                let sign = if up[at] < 0.0 { "-" } else { "" };
-                format!("--up {sign}{}", ["x", "y", "z"].get(at).copied().unwrap_or("z"))
-            }
-            Self::HandLag(secs) => format!("--hand-lag {secs:.2}"),
-        }
-    }
-}
 
 /// Length of a grown person's palm from the wrist to the middle knuckle, metres, with room for children and errors.
 const PALM_M: std::ops::Range<f64> = 0.04..0.16;
 
 /// All findings. A few images of depth and masks are decoded.
 #[must_use]
-pub fn findings(imported: &Imported) -> Vec<Finding> {
+pub fn findings(imported: &Imported) -> Vec<ImportFinding> {
     let Some(posed) = posed(imported) else { return palm(imported).into_iter().collect() };
     let subject = subject(imported, posed);
     let found = conventions::findings(&subject);
@@ -119,11 +44,11 @@ fn convention(imported: &Imported, posed: &Capture) -> Convention {
 /// Order of the quaternions in the file; `None` where its rotations are no quaternions.
 fn order(imported: &Imported, posed: &Capture) -> Option<QuaternionOrder> {
     let first = posed.poses.as_ref()?.items.first()?;
-    matches!(first.pose.turn, Turn::Quaternion(_)).then(|| Convention::of(posed, &imported.options).quaternion)
+    matches!(first.pose.turn, RawRotation::Quaternion(_)).then(|| Convention::of(posed, &imported.options).quaternion)
 }
 
 fn subject<'a>(imported: &'a Imported, posed: &Capture) -> Subject<'a> {
-    let having = |has: &dyn Fn(&super::Frame) -> bool| -> Vec<usize> {
+    let having = |has: &dyn Fn(&super::imported::ImportedFrame) -> bool| -> Vec<usize> {
         imported.frames.iter().enumerate().filter(|(_, f)| has(f)).map(|(i, _)| i).collect()
     };
     let hands = imported.hands.iter().filter_map(|h| {
@@ -172,7 +97,7 @@ fn readings(imported: &Imported, posed: &Capture) -> Vec<(Reading, Vec<Pose>)> {
 }
 
 /// A finding with the options that set it right, in the place of an edit.
-fn in_options(found: conventions::Finding, imported: &Imported, posed: &Capture, subject: &Subject) -> Finding {
+fn in_options(found: conventions::Finding, imported: &Imported, posed: &Capture, subject: &Subject) -> ImportFinding {
     let changes = found.fix.as_ref().and_then(|fix| changes(fix, imported, posed, subject)).unwrap_or_default();
     let option = if changes.is_empty() {
         found.remedy.clone()
@@ -180,7 +105,7 @@ fn in_options(found: conventions::Finding, imported: &Imported, posed: &Capture,
         changes.iter().map(Change::words).collect::<Vec<_>>().join(" ")
     };
     let (certain, can_be_fixed) = (found.is_certain(), found.can_be_fixed() && !changes.is_empty());
-    Finding { what: found.what, evidence: found.evidence, option, certain, can_be_fixed, changes }
+    ImportFinding { what: found.what, evidence: found.evidence, option, certain, can_be_fixed, changes }
 }
 
 /// A fix as changes of options; `None` where no option does it.
@@ -242,7 +167,7 @@ fn other_axes(axes: &Matrix3<f64>, imported: &Imported, convention: &Convention)
 }
 
 /// A hand's own size tells the unit of the hands.
-fn palm(imported: &Imported) -> Option<Finding> {
+fn palm(imported: &Imported) -> Option<ImportFinding> {
     let lengths: Vec<f64> = imported
         .hands
         .iter()
@@ -252,7 +177,7 @@ fn palm(imported: &Imported) -> Option<Finding> {
         })
         .collect();
     let length = stats::median(&lengths)?;
-    (!PALM_M.contains(&length)).then(|| Finding {
+    (!PALM_M.contains(&length)).then(|| ImportFinding {
         what: "the hands are not in metres".to_owned(),
         evidence: format!(
             "from the wrist to the middle knuckle are {length:.4} m (median), a hand's palm is 0.07 to 0.11"

@@ -4,18 +4,15 @@ use std::io::Cursor;
 
 use image::{DynamicImage, ImageReader, RgbImage};
 
+use super::believable::MAX_PIXELS;
 use super::blob::Blob;
 use super::capture::{ByteOrder, Depth, DepthCoding, PixelCoding};
 use crate::error::{Error, Result};
+use crate::json::POINTER;
 use crate::recording::{Grid, images};
 
 /// A decoder may claim any size; a 4K RGB image needs 25 MB.
 const MAX_DECODED_BYTES: u64 = 512 << 20;
-/// Numbers that one byte of a file can stand for: deflate makes at most 1032 bytes of one, run lengths of wavelets more.
-pub(super) const MOST_OF_A_BYTE: usize = 32 << 10;
-/// More pixels than any camera here has.
-pub(super) const MAX_PIXELS: usize = 64 << 20;
-
 /// An image, its format told by its content.
 ///
 /// # Errors
@@ -23,13 +20,17 @@ pub(super) const MAX_PIXELS: usize = 64 << 20;
 pub fn picture(blob: &Blob) -> Result<DynamicImage> {
     let bytes = blob.read()?;
     let file_bytes = bytes.len() as u64;
+    let is_pointer = bytes.starts_with(POINTER.0);
     let mut reader = ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()
         .map_err(|e| blob.fault(format!("cannot be read ({e})")))?;
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(MAX_DECODED_BYTES);
     reader.limits(limits);
-    let wrong = |e: image::ImageError| blob.fault(format!("is no image that can be decoded ({e}); JPEG and PNG can"));
+    let wrong = |e: image::ImageError| match is_pointer {
+        true => blob.fault(POINTER.1),
+        false => blob.fault(format!("is no image that can be decoded ({e}); JPEG and PNG can")),
+    };
     let decoder = reader.into_decoder().map_err(wrong)?;
     images::believable(&decoder, file_bytes).map_err(|e| blob.fault(e))?;
     DynamicImage::from_decoder(decoder).map_err(wrong)
@@ -246,7 +247,7 @@ fn pgm(blob: &Blob, unit_m: f64) -> Result<Grid<f32>> {
     Ok(Grid { width, height, data })
 }
 
-fn npy(blob: &Blob, unit_m: f64) -> Result<Grid<f32>> {
+pub(super) fn npy(blob: &Blob, unit_m: f64) -> Result<Grid<f32>> {
     let bytes = blob.read()?;
     if let Some(why) = crate::recording::npy::refused(&bytes) {
         return Err(blob.fault(format!("is no numpy array ({why})")));

@@ -7,8 +7,8 @@ use std::io::Cursor;
 
 use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Layer, MetaData, ReadChannels, ReadLayers};
 
+use super::believable::{MAX_PIXELS, MOST_OF_A_BYTE};
 use super::blob::Blob;
-use super::decode::{MAX_PIXELS, MOST_OF_A_BYTE};
 use crate::error::{Error, Result};
 use crate::recording::Grid;
 

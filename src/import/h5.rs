@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::blob::MAX_BLOB_BYTES;
+use super::believable::MAX_BLOB_BYTES;
 use crate::error::{Error, Result};
 
 /// An open file.

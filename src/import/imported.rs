@@ -10,14 +10,15 @@ use serde_json::{Value, json};
 
 use super::axes::Convention;
 use super::blob::Blob;
-use super::capture::{Along, At, Capture, Depth, DepthAt, Missing, Picture};
-use super::joints::TIPS;
+use super::capture::{Along, At, Capture, Depth, DepthAt, ImageSource, Missing};
+use super::choices::ImportOptions;
+use super::frame_timeline::Item;
+use super::joint_orders::TIPS;
 use super::optics::Optics;
-use super::report::Report;
-use super::timeline::Item;
-use super::view::View;
+use super::output_view::OutputView;
+use super::report::ImportReport;
 use super::warp::DepthCamera;
-use super::{Options, decode, video, warp};
+use super::{decode, video, warp};
 use crate::error::{Error, Result};
 use crate::math::{Point, Pose};
 use crate::recording::{Clip, Grid, Side};
@@ -27,7 +28,7 @@ const JPEG_QUALITY: u8 = 95;
 
 /// A frame of the result.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Frame {
+pub struct ImportedFrame {
     /// Where it is in the source.
     pub at: At,
     /// Seconds.
@@ -73,9 +74,9 @@ pub struct Written {
 #[derive(Debug, Clone)]
 pub struct Imported {
     /// The output's camera.
-    pub view: View,
+    pub view: OutputView,
     /// Frames in time order.
-    pub frames: Vec<Frame>,
+    pub frames: Vec<ImportedFrame>,
     /// Narrations.
     pub clips: Vec<Clip>,
     /// Hands, by frame and side.
@@ -85,13 +86,13 @@ pub struct Imported {
     /// Points of a static reconstruction, world, metres.
     pub points: Vec<Point>,
     /// What was done.
-    pub report: Report,
+    pub report: ImportReport,
     /// The sources.
     pub captures: Vec<Capture>,
     pub(super) depth_factor: f64,
     pub(super) pictures: Vec<(PathBuf, bool, usize)>,
     pub(super) extracted: BTreeMap<(PathBuf, usize), PathBuf>,
-    pub(super) options: Options,
+    pub(super) options: ImportOptions,
 }
 
 /// The camera of an image of depth: its rays, its own model, or the colour camera's at its size.
@@ -266,26 +267,26 @@ impl Imported {
         text
     }
 
-    fn image(&self, frame: usize, f: &Frame) -> Result<Option<(String, Vec<u8>)>> {
+    fn image(&self, frame: usize, f: &ImportedFrame) -> Result<Option<(String, Vec<u8>)>> {
         let Some(source) = f.image.and_then(|x| self.captures.get(x.capture)?.images.get(x.item)) else {
             return Ok(None);
         };
         let blob = match &source.picture {
-            Picture::Still(blob) | Picture::Raw { blob, .. } => blob.clone(),
-            Picture::Video { file, index, .. } => match self.extracted.get(&(file.clone(), *index)) {
+            ImageSource::Still(blob) | ImageSource::Raw { blob, .. } => blob.clone(),
+            ImageSource::Video { file, index, .. } => match self.extracted.get(&(file.clone(), *index)) {
                 Some(path) => Blob::File(path.clone()),
                 None => return Ok(None),
             },
         };
         // A picture of a video lies in a folder of no name: the video is what a user knows.
         let named = |error: Error| match &source.picture {
-            Picture::Still(_) | Picture::Raw { .. } => error,
-            Picture::Video { file, index, .. } => {
+            ImageSource::Still(_) | ImageSource::Raw { .. } => error,
+            ImageSource::Video { file, index, .. } => {
                 Error::format(file, format!("picture {index}"), "what ffmpeg made of it cannot be read")
             }
         };
         let name = format!("frames/{frame:06}.jpg");
-        let is_file = !matches!(source.picture, Picture::Raw { .. });
+        let is_file = !matches!(source.picture, ImageSource::Raw { .. });
         if is_file && self.view.is_same(&f.optics) {
             let bytes = blob.read().map_err(named)?;
             let is_jpeg = bytes.starts_with(&[0xFF, 0xD8, 0xFF]);
@@ -298,14 +299,14 @@ impl Imported {
             }
         }
         let image = match &source.picture {
-            Picture::Raw { width, height, coding, .. } => decode::pixels(&blob, *width, *height, *coding)?,
-            Picture::Still(_) | Picture::Video { .. } => decode::picture(&blob).map_err(named)?.into_rgb8(),
+            ImageSource::Raw { width, height, coding, .. } => decode::pixels(&blob, *width, *height, *coding)?,
+            ImageSource::Still(_) | ImageSource::Video { .. } => decode::picture(&blob).map_err(named)?.into_rgb8(),
         };
         let (width, height) = (image.width() as usize, image.height() as usize);
         if !f.optics.has_shape(width, height) {
             let file = match &source.picture {
-                Picture::Still(blob) | Picture::Raw { blob, .. } => blob.file(),
-                Picture::Video { file, .. } => file.as_path(),
+                ImageSource::Still(blob) | ImageSource::Raw { blob, .. } => blob.file(),
+                ImageSource::Video { file, .. } => file.as_path(),
             };
             let message = format!(
                 "is {width} x {height}, its camera {} x {}: another shape; a rotated or cropped image needs its own \
@@ -324,7 +325,7 @@ impl Imported {
     }
 
     /// Depth of a frame as the output's camera sees it, metres.
-    pub(super) fn depth_grid(&self, f: &Frame) -> Result<Option<Grid<f32>>> {
+    pub(super) fn depth_grid(&self, f: &ImportedFrame) -> Result<Option<Grid<f32>>> {
         let Some((capture, depth)) =
             f.depth.and_then(|x| self.captures.get(x.capture)).and_then(|c| Some((c, c.depth.as_ref()?)))
         else {
@@ -341,7 +342,7 @@ impl Imported {
         Ok(Some(out))
     }
 
-    fn depth(&self, frame: usize, f: &Frame) -> Result<Option<(String, Vec<u8>)>> {
+    fn depth(&self, frame: usize, f: &ImportedFrame) -> Result<Option<(String, Vec<u8>)>> {
         let Some(grid) = self.depth_grid(f)? else { return Ok(None) };
         // What 16 bits of millimetres cannot hold is no value.
         let counts = grid
@@ -354,7 +355,7 @@ impl Imported {
     }
 
     /// Colour camera from depth camera at a frame.
-    fn color_from_depth(&self, capture: &Capture, depth: &Depth, at: &DepthAt, f: &Frame) -> Option<Pose> {
+    fn color_from_depth(&self, capture: &Capture, depth: &Depth, at: &DepthAt, f: &ImportedFrame) -> Option<Pose> {
         let own = at.pose.as_ref().and_then(|raw| {
             let convention = Convention::of(capture, &self.options);
             Convention { body_from_camera: None, ..convention }.world_from_body(raw)
@@ -366,19 +367,19 @@ impl Imported {
     }
 
     /// Mask of a frame as the output's camera sees it.
-    pub(super) fn mask_grid(&self, f: &Frame) -> Result<Option<Grid<u8>>> {
+    pub(super) fn mask_grid(&self, f: &ImportedFrame) -> Result<Option<Grid<u8>>> {
         let Some(masks) = f.mask.and_then(|x| self.captures.get(x.capture)?.masks.as_ref()?.items.get(x.item)) else {
             return Ok(None);
         };
         warp::mask(&masks.layers, &self.view, &f.optics).map(Some)
     }
 
-    fn mask(&self, frame: usize, f: &Frame) -> Result<Option<(String, Vec<u8>)>> {
+    fn mask(&self, frame: usize, f: &ImportedFrame) -> Result<Option<(String, Vec<u8>)>> {
         let Some(grid) = self.mask_grid(f)? else { return Ok(None) };
         Ok(Some((format!("masks/{frame:06}.png"), self.png(&grid.data, ExtendedColorType::L8)?)))
     }
 
-    fn normals(&self, frame: usize, f: &Frame) -> Result<Option<(String, Vec<u8>)>> {
+    fn normals(&self, frame: usize, f: &ImportedFrame) -> Result<Option<(String, Vec<u8>)>> {
         let Some(normals) = f.normals.and_then(|x| self.captures.get(x.capture)?.normals.as_ref()) else {
             return Ok(None);
         };
@@ -387,7 +388,7 @@ impl Imported {
         Ok(Some((format!("normals/{frame:06}.png"), self.png(&data, ExtendedColorType::Rgb8)?)))
     }
 
-    fn segments(&self, frame: usize, f: &Frame) -> Option<(String, Vec<u8>)> {
+    fn segments(&self, frame: usize, f: &ImportedFrame) -> Option<(String, Vec<u8>)> {
         let at = f.segments.and_then(|x| self.captures.get(x.capture)?.segments.get(x.item))?;
         let lines = warp::segments(&at.segments, &self.view, &f.optics);
         let mut text = format!("{}\n", lines.len());

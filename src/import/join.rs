@@ -144,12 +144,12 @@ fn by_index<'a>(frames: &[At], items: impl Iterator<Item = &'a At>) -> Joined {
 
 /// Poses in the order of their times.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Track {
+pub struct PoseTrack {
     times: Vec<f64>,
     poses: Vec<Pose>,
 }
 
-impl Track {
+impl PoseTrack {
     /// From poses with times, in any order; of several at one time the first one stays.
     #[must_use]
     pub fn of(mut items: Vec<(f64, Pose)>) -> Self {
@@ -234,7 +234,7 @@ mod tests {
     #[test]
     fn poses_are_interpolated_only_within_the_gap() {
         let at = |x: f64| Pose::from_parts(Vector::new(x, 0.0, 0.0).into(), crate::math::rotation(&Vector::z(), x));
-        let track = Track::of(vec![(1.0, at(1.0)), (0.0, at(0.0)), (9.0, at(2.0))]);
+        let track = PoseTrack::of(vec![(1.0, at(1.0)), (0.0, at(0.0)), (9.0, at(2.0))]);
         let half = track.at(0.5, 1.0).unwrap();
         assert!((half.translation.vector.x - 0.5).abs() < 1e-12 && (half.rotation.angle() - 0.5).abs() < 1e-9);
         assert!(track.at(5.0, 1.0).is_none());

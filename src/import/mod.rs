@@ -1,19 +1,21 @@
 //! Doors in: recordings of devices, data sets and networks, as a recording of ours.
 //!
-//! A [`formats::Format`] reads one source into a [`Capture`]: timed streams as plain data, in the source's own words.
+//! A [`formats::ImportFormat`] reads one source into a [`Capture`]: timed streams as plain data, in the source's own words.
 //! [`assemble`] joins captures, brings them to one world (+Z up, metres) and one pinhole camera, and gives an [`Imported`],
 //! whose tables and images are a recording's files. Images and depth are decoded when they are asked for.
 //!
 //! ```text
-//! files ── formats ──> Capture ─┐                ┌ timeline: frames, joins
-//! files ── formats ──> Capture ─┴─ assemble ─────┼ world: scale, gravity          ──> Imported ──> tables, images, import.json
-//!                                                └ people: hands, contact, clips
+//! files ── formats ──> Capture ─┐                ┌ frame_timeline: frames, joins
+//! files ── formats ──> Capture ─┴─ assemble ─────┼ world_placement: scale, gravity ──> Imported ──> tables, images, import.json
+//!                                                └ hands_and_clips: hands, contact, clips
 //! ```
 //!
-//! Axes change in [`axes`], joint orders in [`joints`], pixels in [`warp`], lenses in [`optics`], and nowhere else.
+//! Axes change in [`axes`], joint orders in [`joint_orders`], pixels in [`warp`], lenses in [`optics`], and nowhere else.
 
 pub mod articulations;
+mod at;
 pub mod axes;
+mod believable;
 pub mod blob;
 pub mod capture;
 pub mod checks;
@@ -21,101 +23,32 @@ pub mod decode;
 pub mod formats;
 pub mod h5;
 pub mod join;
-pub mod joints;
-pub mod mcap;
+pub mod joint_orders;
+pub mod mcap_file;
 pub mod names;
 pub mod optics;
+pub mod output_view;
 pub mod pack;
 pub mod ply;
-pub mod poses;
+pub mod raw_poses;
 pub mod report;
 pub mod ros;
 pub mod tar;
 pub mod text;
 pub mod tf;
 pub mod video;
-pub mod view;
 pub mod warp;
 
 mod assembly;
+mod choices;
 mod depth_exr;
+pub mod finding;
+mod frame_timeline;
+mod hands_and_clips;
 mod imported;
-mod people;
-mod timeline;
-mod world;
-
-use std::collections::BTreeMap;
-use std::path::PathBuf;
+mod world_placement;
 
 pub use assembly::assemble;
 pub use capture::Capture;
-pub use imported::{Frame, Hand, Imported, Written};
-
-use crate::math::Vector;
-use capture::{CameraAxes, Direction, QuaternionOrder};
-use optics::Optics;
-
-/// What a user chooses, or says over what a source declares. The default changes nothing.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Options {
-    /// Frames a second that are kept; 0 keeps all. 10 is what the pipeline was measured at.
-    pub fps: f64,
-    /// Frames a second of sources without times; `None`: 30, which is said in the report.
-    pub source_fps: Option<f64>,
-    /// The largest distance in time of two streams' items, seconds; `None`: half of the frames' period.
-    pub max_gap_secs: Option<f64>,
-    /// The largest distance in time of two poses that are interpolated, seconds.
-    pub pose_gap_secs: f64,
-    /// Image width of the output at the most, pixels.
-    pub width: usize,
-    /// Field of view of the output along its width at the most, degrees; `None`: fisheyes 100, other lenses as they are.
-    pub fov_deg: Option<f64>,
-    /// Clockwise quarter turns of the images.
-    pub rotate_quarters: u8,
-    /// The colour camera, where no source has its intrinsics.
-    pub camera: Option<Optics>,
-    /// Up in the axes of the source with the poses.
-    pub up: Option<Vector>,
-    /// Metres per unit of the source with the poses.
-    pub unit_m: Option<f64>,
-    /// What poses map.
-    pub poses: Option<Direction>,
-    /// Axes of the posed camera.
-    pub camera_axes: Option<CameraAxes>,
-    /// Order of quaternions.
-    pub quaternion: Option<QuaternionOrder>,
-    /// What lengths of a source of arbitrary scale are multiplied by to be metres; `None`: found from depth or hands.
-    pub scale: Option<f64>,
-    /// What is added to the hands' times, seconds.
-    pub hand_lag_secs: f64,
-    /// Topics of a robot's recording by what they hold: `color`, `depth`, `poses`. Those that are not told are guessed.
-    pub topics: BTreeMap<String, String>,
-    /// The ffmpeg program, ffprobe beside it; `None`: those that are installed.
-    pub ffmpeg: Option<PathBuf>,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            fps: 10.0,
-            source_fps: None,
-            max_gap_secs: None,
-            // A head turns by some 10 degrees in a fifth of a second; a longer gap is a lost track.
-            pose_gap_secs: 0.2,
-            // Twice the width that the pipeline was measured at.
-            width: 640,
-            fov_deg: None,
-            rotate_quarters: 0,
-            camera: None,
-            up: None,
-            unit_m: None,
-            poses: None,
-            camera_axes: None,
-            quaternion: None,
-            scale: None,
-            hand_lag_secs: 0.0,
-            topics: BTreeMap::new(),
-            ffmpeg: None,
-        }
-    }
-}
+pub use choices::ImportOptions;
+pub use imported::{Hand, Imported, ImportedFrame, Written};

@@ -7,7 +7,7 @@ const MOST_STRETCHED: usize = 16;
 
 /// How a lens bends rays, with x = X/Z and y = Y/Z, or the angle to the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Lens {
+pub enum LensModel {
     /// Not at all.
     Pinhole,
     /// OpenCV's: `(1 + k1 r2 + k2 r4 + k3 r6) / (1 + k4 r2 + k5 r4 + k6 r6)` and tangential p1, p2. COLMAP's radial models are
@@ -50,7 +50,7 @@ pub struct Optics {
     /// Principal point, y.
     pub cy: f64,
     /// The lens.
-    pub lens: Lens,
+    pub lens: LensModel,
 }
 
 /// A principal point that is counted from the corner of the first pixel (COLMAP, nerfstudio), counted from its centre.
@@ -79,7 +79,7 @@ impl Optics {
     /// A pinhole camera.
     #[must_use]
     pub fn pinhole(width: usize, height: usize, [fx, fy, cx, cy]: [f64; 4]) -> Self {
-        Self { width, height, fx, fy, cx, cy, lens: Lens::Pinhole }
+        Self { width, height, fx, fy, cx, cy, lens: LensModel::Pinhole }
     }
 
     /// What is wrong with the numbers; `None` where nothing is.
@@ -102,10 +102,10 @@ impl Optics {
             return Some(format!("cx {}, cy {} must be pixels on the image or near it", self.cx, self.cy));
         }
         let finite = match self.lens {
-            Lens::Pinhole => true,
-            Lens::OpenCv { k, p } => k.iter().chain(&p).all(|x| x.is_finite()),
-            Lens::Fisheye { k } => k.iter().all(|x| x.is_finite()),
-            Lens::FisheyeRadTanThinPrism { k, p, s } => k.iter().chain(&p).chain(&s).all(|x| x.is_finite()),
+            LensModel::Pinhole => true,
+            LensModel::OpenCv { k, p } => k.iter().chain(&p).all(|x| x.is_finite()),
+            LensModel::Fisheye { k } => k.iter().all(|x| x.is_finite()),
+            LensModel::FisheyeRadTanThinPrism { k, p, s } => k.iter().chain(&p).chain(&s).all(|x| x.is_finite()),
         };
         (!finite).then(|| "a distortion coefficient is not finite".to_owned())
     }
@@ -113,7 +113,7 @@ impl Optics {
     /// Whether the lens may see beside itself and behind.
     #[must_use]
     pub fn is_fisheye(&self) -> bool {
-        matches!(self.lens, Lens::Fisheye { .. } | Lens::FisheyeRadTanThinPrism { .. })
+        matches!(self.lens, LensModel::Fisheye { .. } | LensModel::FisheyeRadTanThinPrism { .. })
     }
 
     /// The same camera at another size of its images.
@@ -145,14 +145,14 @@ impl Optics {
     #[must_use]
     pub fn project(&self, p: &Point) -> Option<(f64, f64)> {
         let (x, y) = match self.lens {
-            Lens::Pinhole | Lens::OpenCv { .. } if p.z <= 1e-9 => return None,
-            Lens::Pinhole => (p.x / p.z, p.y / p.z),
-            Lens::OpenCv { k, p: tangential } => radial_tangential(p.x / p.z, p.y / p.z, &k, tangential)?,
-            Lens::Fisheye { k } => {
+            LensModel::Pinhole | LensModel::OpenCv { .. } if p.z <= 1e-9 => return None,
+            LensModel::Pinhole => (p.x / p.z, p.y / p.z),
+            LensModel::OpenCv { k, p: tangential } => radial_tangential(p.x / p.z, p.y / p.z, &k, tangential)?,
+            LensModel::Fisheye { k } => {
                 let (x, y, _) = bent(p, &k)?;
                 (x, y)
             }
-            Lens::FisheyeRadTanThinPrism { k, p: [p0, p1], s } => {
+            LensModel::FisheyeRadTanThinPrism { k, p: [p0, p1], s } => {
                 let (x, y, _) = bent(p, &k)?;
                 let r2 = x * x + y * y;
                 let dot = 2.0 * (x * p0 + y * p1);
@@ -167,7 +167,7 @@ impl Optics {
     #[must_use]
     pub fn direction(&self, u: f64, v: f64) -> Option<Vector> {
         let (x, y) = ((u - self.cx) / self.fx, (v - self.cy) / self.fy);
-        if self.lens == Lens::Pinhole {
+        if self.lens == LensModel::Pinhole {
             return crate::math::unit(&Vector::new(x, y, 1.0));
         }
         // Newton's method on the ray's angle times its direction in the image, which suits every lens.
@@ -261,10 +261,10 @@ mod tests {
         let base = Optics::pinhole(640, 480, [400.0, 410.0, 310.0, 250.0]);
         vec![
             base,
-            Optics { lens: Lens::OpenCv { k: [-0.1, 0.02, 0.0, 0.0, 0.0, 0.0], p: [0.001, -0.002] }, ..base },
-            Optics { lens: Lens::Fisheye { k: [0.01, -0.02, 0.003, 0.0] }, ..base },
+            Optics { lens: LensModel::OpenCv { k: [-0.1, 0.02, 0.0, 0.0, 0.0, 0.0], p: [0.001, -0.002] }, ..base },
+            Optics { lens: LensModel::Fisheye { k: [0.01, -0.02, 0.003, 0.0] }, ..base },
             Optics {
-                lens: Lens::FisheyeRadTanThinPrism {
+                lens: LensModel::FisheyeRadTanThinPrism {
                     k: [0.4, -0.4, 0.15, 1.1, -1.6, 0.6],
                     p: [0.0003, -0.0002],
                     s: [0.001, -0.0001, -0.0004, 0.0001],
@@ -290,10 +290,10 @@ mod tests {
     fn lenses_have_the_values_of_their_formulas() {
         let one = Optics::pinhole(10, 10, [1.0, 1.0, 0.0, 0.0]);
         let p = Point::new(0.3, 0.4, 1.0);
-        let cv = Optics { lens: Lens::OpenCv { k: [0.1, 0.0, 0.0, 0.0, 0.0, 0.0], p: [0.01, 0.0] }, ..one };
+        let cv = Optics { lens: LensModel::OpenCv { k: [0.1, 0.0, 0.0, 0.0, 0.0, 0.0], p: [0.01, 0.0] }, ..one };
         let (u, v) = cv.project(&p).unwrap();
         assert!((u - (0.3 * 1.025 + 0.0024)).abs() < 1e-12 && (v - (0.4 * 1.025 + 0.0057)).abs() < 1e-12, "{u} {v}");
-        let fish = Optics { lens: Lens::Fisheye { k: [0.0; 4] }, ..one };
+        let fish = Optics { lens: LensModel::Fisheye { k: [0.0; 4] }, ..one };
         let (u, v) = fish.project(&p).unwrap();
         assert!((u.hypot(v) - 0.5f64.atan()).abs() < 1e-12 && (u / v - 0.75).abs() < 1e-12);
         // Straight to the side: only a fisheye sees it.
@@ -322,7 +322,7 @@ mod tests {
     #[test]
     fn beyond_its_fold_a_lens_sees_nothing() {
         let base = Optics::pinhole(640, 480, [400.0, 400.0, 319.5, 239.5]);
-        let optics = Optics { lens: Lens::OpenCv { k: [-0.3, 0.0, 0.0, 0.0, 0.0, 0.0], p: [0.0; 2] }, ..base };
+        let optics = Optics { lens: LensModel::OpenCv { k: [-0.3, 0.0, 0.0, 0.0, 0.0, 0.0], p: [0.0; 2] }, ..base };
         assert!(optics.project(&Point::new(0.5, 0.0, 1.0)).is_some());
         assert!(optics.project(&Point::new(1.6, 0.0, 1.0)).is_none());
     }

@@ -20,12 +20,12 @@ pub struct Cloud {
     /// A colour for each vertex; empty where the file has none.
     pub colors: Vec<[u8; 3]>,
     /// The faces.
-    pub faces: Vec<Face>,
+    pub faces: Vec<PlyFace>,
 }
 
 /// A face of a mesh.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Face {
+pub struct PlyFace {
     /// Numbers of its vertices; some may be beyond the last one.
     pub corners: Vec<usize>,
     /// `partId`, as MultiScan writes it.
@@ -80,7 +80,7 @@ impl PropertyAccess for Vertex {
     }
 }
 
-impl PropertyAccess for Face {
+impl PropertyAccess for PlyFace {
     fn new() -> Self {
         Self::default()
     }
@@ -146,7 +146,7 @@ pub fn read(path: &Path) -> Result<Cloud> {
                 }
             }
             "face" => {
-                cloud.faces = Parser::<Face>::new()
+                cloud.faces = Parser::<PlyFace>::new()
                     .read_payload_for_element(&mut reader, element, &header)
                     .map_err(|e| broken("faces", e.to_string()))?;
             }
@@ -186,7 +186,7 @@ mod tests {
         assert_eq!(cloud.points[2], Point::new(0.0, 2.0, 0.0));
         assert_eq!(cloud.colors[1], [0, 255, 0]);
         assert!(cloud.normals.is_empty());
-        assert_eq!(cloud.faces, [Face { corners: vec![0, 1, 2], part: Some(7) }]);
+        assert_eq!(cloud.faces, [PlyFace { corners: vec![0, 1, 2], part: Some(7) }]);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::capture::{Capture, Missing};
+use super::finding::ImportFinding;
 
 /// A source.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -23,7 +24,7 @@ pub struct SourceReport {
 
 /// A stream of the result.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Stream {
+pub struct StreamReport {
     /// Its name.
     pub stream: String,
     /// Items in the result.
@@ -60,11 +61,11 @@ pub struct Up {
 
 /// What an import did.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Report {
+pub struct ImportReport {
     /// The sources, in the order of their priority.
     pub sources: Vec<SourceReport>,
     /// The streams.
-    pub streams: Vec<Stream>,
+    pub streams: Vec<StreamReport>,
     /// The scale, where the source with the poses had none or the user gave one.
     pub scale: Option<Scale>,
     /// Up.
@@ -78,7 +79,7 @@ pub struct Report {
     /// Items that could not be read, one sentence each.
     pub faults: Vec<String>,
     /// What the checks found: see [`super::checks`].
-    pub findings: Vec<super::checks::Finding>,
+    pub findings: Vec<ImportFinding>,
 }
 
 /// A source's name for people: kind and the last part of its path.
@@ -135,7 +136,8 @@ pub(super) const NEEDED: [(&str, &str, &str); 6] = [
     ),
     (
         "depth",
-        "what moved is seen by depth",
+        "without it joints come from the hand's path, names and lines in the images, and are less sure; fronts and boxes are \
+         assumed",
         "run a metric depth network on the source's own images (MoGe-2: moge infer -i IMAGES -o DEPTH --maps) and import its \
          folder too",
     ),
@@ -156,6 +158,10 @@ pub(super) const NEEDED: [(&str, &str, &str); 6] = [
          {\"clips\": [{\"clip\", \"start_frame\", \"end_frame\", \"narration\"}]}",
     ),
 ];
+
+/// What points that do not cover surfaces are worth in place of depth.
+pub(super) const SPARSE: &str = "points with holes between them tell fronts, not what moved: joints come from the hand's path and are \
+     less sure, boxes are assumed";
 
 /// What to do about a stream that a source has and that meets no frame.
 pub(super) const UNMET: &str = "streams meet by time, by the image's name or by the frame's number: run networks on the source's \

@@ -2,8 +2,8 @@
 
 use nalgebra::{Quaternion, UnitQuaternion};
 
-use super::capture::{RawPose, Turn};
-use super::optics::{Lens, Optics};
+use super::capture::{RawPose, RawRotation};
+use super::optics::{LensModel, Optics};
 use crate::math::{Pose, Vector};
 
 /// Bytes before the first field; alignment counts from behind them.
@@ -11,7 +11,7 @@ const ENCAPSULATION_BYTES: usize = 4;
 
 /// When and in which frame.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Header {
+pub struct RosHeader {
     /// Seconds; 0 where nobody set it.
     pub time_secs: f64,
     /// Name of the frame, without a slash in front.
@@ -20,9 +20,9 @@ pub struct Header {
 
 /// What stands before an image's pixels.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Image {
+pub struct RosImage {
     /// When and in which frame.
-    pub header: Header,
+    pub header: RosHeader,
     /// Rows.
     pub height: usize,
     /// Columns.
@@ -43,7 +43,7 @@ pub struct Image {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Compressed {
     /// When and in which frame.
-    pub header: Header,
+    pub header: RosHeader,
     /// How it is compressed: `jpeg`, `16UC1; compressedDepth png`.
     pub format: String,
     /// First byte in the message.
@@ -56,7 +56,7 @@ pub struct Compressed {
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraInfo {
     /// When and in which frame.
-    pub header: Header,
+    pub header: RosHeader,
     /// Columns and rows.
     pub size: [usize; 2],
     /// Name of the lens' model.
@@ -71,9 +71,9 @@ pub struct CameraInfo {
 
 /// A pose of a body.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Posed {
+pub struct RosPose {
     /// When, and in which frame it is told.
-    pub header: Header,
+    pub header: RosHeader,
     /// The body's frame, where the message names it.
     pub body: Option<String>,
     /// The body in that frame.
@@ -148,21 +148,21 @@ impl<'a> Cdr<'a> {
         Some(self.text()?.trim_start_matches('/').to_owned())
     }
 
-    fn header(&mut self) -> Option<Header> {
+    fn header(&mut self) -> Option<RosHeader> {
         let secs = self.number().map(i32::from_le_bytes)?;
         let nanos = self.u32()?;
-        Some(Header { time_secs: f64::from(secs) + 1e-9 * f64::from(nanos), frame: self.frame()? })
+        Some(RosHeader { time_secs: f64::from(secs) + 1e-9 * f64::from(nanos), frame: self.frame()? })
     }
 
     /// Position and quaternion x y z w.
     fn pose(&mut self) -> Option<RawPose> {
-        Some(RawPose { position: self.f64s()?, turn: Turn::Quaternion(self.f64s()?) })
+        Some(RawPose { position: self.f64s()?, turn: RawRotation::Quaternion(self.f64s()?) })
     }
 }
 
 /// An image that is not compressed (`sensor_msgs/Image`).
 #[must_use]
-pub fn image(message: &[u8]) -> Option<Image> {
+pub fn image(message: &[u8]) -> Option<RosImage> {
     let mut cdr = Cdr::of(message)?;
     let header = cdr.header()?;
     let (height, width) = (cdr.length()?, cdr.length()?);
@@ -170,7 +170,7 @@ pub fn image(message: &[u8]) -> Option<Image> {
     let is_bigendian = cdr.u8()? != 0;
     let step = cdr.length()?;
     let length = cdr.length()?;
-    Some(Image { header, height, width, encoding, is_bigendian, step, start: cdr.at, length })
+    Some(RosImage { header, height, width, encoding, is_bigendian, step, start: cdr.at, length })
 }
 
 /// A compressed image (`sensor_msgs/CompressedImage`).
@@ -203,30 +203,30 @@ pub fn camera_info(message: &[u8]) -> Option<CameraInfo> {
 
 /// A pose (`geometry_msgs/PoseStamped`, `PoseWithCovarianceStamped`).
 #[must_use]
-pub fn pose_stamped(message: &[u8]) -> Option<Posed> {
+pub fn pose_stamped(message: &[u8]) -> Option<RosPose> {
     let mut cdr = Cdr::of(message)?;
-    Some(Posed { header: cdr.header()?, body: None, pose: cdr.pose()? })
+    Some(RosPose { header: cdr.header()?, body: None, pose: cdr.pose()? })
 }
 
 /// A pose with the body that it is of (`nav_msgs/Odometry`).
 #[must_use]
-pub fn odometry(message: &[u8]) -> Option<Posed> {
+pub fn odometry(message: &[u8]) -> Option<RosPose> {
     let mut cdr = Cdr::of(message)?;
     let header = cdr.header()?;
     let body = Some(cdr.frame()?).filter(|b| !b.is_empty());
-    Some(Posed { header, body, pose: cdr.pose()? })
+    Some(RosPose { header, body, pose: cdr.pose()? })
 }
 
 /// Transforms (`tf2_msgs/TFMessage`); the body is the child.
 #[must_use]
-pub fn transforms(message: &[u8]) -> Option<Vec<Posed>> {
+pub fn transforms(message: &[u8]) -> Option<Vec<RosPose>> {
     let mut cdr = Cdr::of(message)?;
     let count = cdr.length()?;
     let mut out = Vec::new();
     for _ in 0..count {
         let header = cdr.header()?;
         let body = Some(cdr.frame()?);
-        out.push(Posed { header, body, pose: cdr.pose()? });
+        out.push(RosPose { header, body, pose: cdr.pose()? });
     }
     Some(out)
 }
@@ -234,7 +234,7 @@ pub fn transforms(message: &[u8]) -> Option<Vec<Posed>> {
 /// A pose of a message as a rigid transform; `None` where its numbers are none.
 #[must_use]
 pub fn rigid(raw: &RawPose) -> Option<Pose> {
-    let Turn::Quaternion([x, y, z, w]) = raw.turn else { return None };
+    let RawRotation::Quaternion([x, y, z, w]) = raw.turn else { return None };
     let q = Quaternion::new(w, x, y, z);
     // An empty message has zeros.
     let is_turn = (q.norm() - 1.0).abs() < 0.02 && raw.position.iter().all(|x| x.is_finite());
@@ -249,18 +249,18 @@ impl CameraInfo {
         let [width, height] = self.size;
         let (k, p) = (&self.k, &self.p);
         let f = if is_rectified && p[0] > 0.0 { [p[0], p[5], p[2], p[6]] } else { [k[0], k[4], k[2], k[5]] };
-        let lens = if is_rectified || self.d.iter().all(|d| *d == 0.0) { Lens::Pinhole } else { self.lens()? };
+        let lens = if is_rectified || self.d.iter().all(|d| *d == 0.0) { LensModel::Pinhole } else { self.lens()? };
         let optics = Optics { lens, ..Optics::pinhole(width, height, f) };
         optics.fault().is_none().then_some(optics)
     }
 
-    fn lens(&self) -> Option<Lens> {
+    fn lens(&self) -> Option<LensModel> {
         let d = |i: usize| self.d.get(i).copied().unwrap_or(0.0);
         match self.model.as_str() {
             "plumb_bob" | "rational_polynomial" | "" => {
-                Some(Lens::OpenCv { k: [d(0), d(1), d(4), d(5), d(6), d(7)], p: [d(2), d(3)] })
+                Some(LensModel::OpenCv { k: [d(0), d(1), d(4), d(5), d(6), d(7)], p: [d(2), d(3)] })
             }
-            "equidistant" | "fisheye" => Some(Lens::Fisheye { k: [d(0), d(1), d(2), d(3)] }),
+            "equidistant" | "fisheye" => Some(LensModel::Fisheye { k: [d(0), d(1), d(2), d(3)] }),
             _ => None,
         }
     }

@@ -131,6 +131,39 @@ impl<R: BufRead> Lines<R> {
     }
 }
 
+/// Rows, or frames, of a source that cannot be read while most can: each costs only itself.
+#[derive(Debug, Default)]
+pub struct Unread {
+    count: usize,
+    first: Option<Error>,
+}
+
+impl Unread {
+    /// What a row holds; `None`, and one more that cannot be read, where it cannot be.
+    pub fn keep<T>(&mut self, row: Result<T>) -> Option<T> {
+        match row {
+            Ok(value) => Some(value),
+            Err(error) => {
+                self.count += 1;
+                self.first.get_or_insert(error);
+                None
+            }
+        }
+    }
+
+    /// What was left out, in words for people; `None` where all could be read. `read` of them could, `what` they are.
+    ///
+    /// # Errors
+    /// The first fault, where fewer could be read than could not.
+    pub fn told(self, what: &str, read: usize) -> Result<Option<String>> {
+        match self.first {
+            None => Ok(None),
+            Some(error) if self.count > read => Err(error),
+            Some(error) => Ok(Some(format!("{} {what} that cannot be read, the first one: {error}", self.count))),
+        }
+    }
+}
+
 /// The start of a text, for messages.
 fn start(text: &str) -> String {
     text.trim().chars().take(40).collect()
@@ -168,7 +201,7 @@ fn unquoted(cell: &str) -> Cow<'_, str> {
 }
 
 /// A table with a header line, read row by row; columns are found by their names.
-pub struct Table {
+pub struct TextTable {
     lines: Lines,
     columns: BTreeMap<String, usize>,
     header: Vec<String>,
@@ -176,16 +209,16 @@ pub struct Table {
     separator: Option<char>,
 }
 
-/// A row of a [`Table`].
-pub struct Row<'a> {
-    table: &'a Table,
+/// A row of a [`TextTable`].
+pub struct TableRow<'a> {
+    table: &'a TextTable,
     /// The cells without their quotes, one behind the other.
     content: String,
     /// First byte of each cell in it, and the first one behind.
     bounds: Vec<(usize, usize)>,
 }
 
-impl Table {
+impl TextTable {
     /// Opens a file and reads its header; names are taken without quotes and in lower case.
     ///
     /// # Errors
@@ -225,7 +258,7 @@ impl Table {
     ///
     /// # Errors
     /// Where a row has another number of cells than the header.
-    pub fn row(&mut self) -> Result<Option<Row<'_>>> {
+    pub fn row(&mut self) -> Result<Option<TableRow<'_>>> {
         let Some(line) = self.lines.content()? else { return Ok(None) };
         // A table may have millions of rows: no text of its own for each cell.
         let mut content = String::with_capacity(line.len());
@@ -241,11 +274,11 @@ impl Table {
                 "{found} cells, the header has {expected}; a file that ends early is a copy that was not finished"
             )));
         }
-        Ok(Some(Row { table: self, content, bounds }))
+        Ok(Some(TableRow { table: self, content, bounds }))
     }
 }
 
-impl Row<'_> {
+impl TableRow<'_> {
     /// A cell's text; empty where there is no such column.
     #[must_use]
     pub fn text(&self, column: &str) -> &str {
@@ -308,7 +341,7 @@ mod tests {
     #[test]
     fn columns_are_found_by_name_in_any_order() {
         let (_dir, path) = written("\u{feff}b, \"A\"\r\n\r\n2.5, 000007\r\n");
-        let mut table = Table::open(&path).unwrap();
+        let mut table = TextTable::open(&path).unwrap();
         table.need(&["a", "b"]).unwrap();
         let row = table.row().unwrap().unwrap();
         assert_eq!((row.number("b").unwrap(), row.whole("a").unwrap()), (2.5, 7));
@@ -318,7 +351,7 @@ mod tests {
     #[test]
     fn a_quoted_comma_separates_nothing() {
         let (_dir, path) = written("a,b\n\"open \"\"the\"\" door, slowly\",2\n");
-        let mut table = Table::open(&path).unwrap();
+        let mut table = TextTable::open(&path).unwrap();
         let row = table.row().unwrap().unwrap();
         assert_eq!((row.text("a"), row.whole("b").unwrap()), ("open \"the\" door, slowly", 2));
     }
@@ -334,7 +367,7 @@ mod tests {
         ] {
             let (_dir, path) = written(text);
             let read = || -> Result<()> {
-                let mut table = Table::open(&path)?;
+                let mut table = TextTable::open(&path)?;
                 table.need(&["a", "b"])?;
                 while let Some(row) = table.row()? {
                     row.numbers(["a", "b"])?;
@@ -355,14 +388,14 @@ mod tests {
         packer.write_all(b"a,b\n1,2\n3,4\n").unwrap();
         let bytes = packer.finish().unwrap();
         std::fs::write(&path, &bytes).unwrap();
-        let mut table = Table::open(&path).unwrap();
+        let mut table = TextTable::open(&path).unwrap();
         assert_eq!(table.row().unwrap().unwrap().numbers(["b", "a"]).unwrap(), [2.0, 1.0]);
         assert_eq!(table.row().unwrap().unwrap().number("a").unwrap(), 3.0);
         assert!(table.row().unwrap().is_none());
         // Without its end.
         std::fs::write(&path, &bytes[..bytes.len() - 6]).unwrap();
         let read = || -> Result<()> {
-            let mut table = Table::open(&path)?;
+            let mut table = TextTable::open(&path)?;
             while table.row()?.is_some() {}
             Ok(())
         };

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::join::Track;
+use super::join::PoseTrack;
 use crate::math::Pose;
 
 /// How far two transforms of a frame that does not move may be apart, metres and radians: rounding.
@@ -15,21 +15,21 @@ struct Edge {
 
 /// The frames.
 #[derive(Default)]
-pub struct Tree {
+pub struct TransformTree {
     edges: BTreeMap<String, Edge>,
 }
 
 /// The way from one frame to another.
 pub struct Chain {
     /// From the first frame up to the common one: to be inverted.
-    up: Vec<Track>,
+    up: Vec<PoseTrack>,
     /// From the common one down to the second frame.
-    down: Vec<Track>,
+    down: Vec<PoseTrack>,
     /// Times of the edge that moves most often, seconds.
     times: Vec<f64>,
 }
 
-impl Tree {
+impl TransformTree {
     /// Adds what was told of a frame at a time, seconds. A frame has one parent: the first one that is told.
     pub fn add(&mut self, parent: &str, child: &str, time_secs: f64, pose: Pose) {
         let edge =
@@ -74,7 +74,7 @@ impl Tree {
         let mut times: Vec<f64> = busiest.map(|e| e.poses.iter().map(|(t, _)| *t).collect()).unwrap_or_default();
         times.sort_by(f64::total_cmp);
         times.dedup();
-        let tracks = |edges: Vec<&Edge>| edges.into_iter().map(|e| Track::of(e.poses.clone())).collect();
+        let tracks = |edges: Vec<&Edge>| edges.into_iter().map(|e| PoseTrack::of(e.poses.clone())).collect();
         Some(Chain { up: tracks(up), down: tracks(down), times })
     }
 }
@@ -99,7 +99,7 @@ impl Chain {
     /// The second frame in the first one at a time, seconds, between what is told before and after it.
     #[must_use]
     pub fn at(&self, time_secs: f64) -> Option<Pose> {
-        let product = |tracks: &[Track]| {
+        let product = |tracks: &[PoseTrack]| {
             tracks.iter().try_fold(Pose::identity(), |sum, track| Some(sum * track.at(time_secs, f64::INFINITY)?))
         };
         // Upwards the first edge is the lowest one.
@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn frames_are_found_up_and_down_the_tree() {
-        let mut tree = Tree::default();
+        let mut tree = TransformTree::default();
         tree.add("map", "odom", 0.0, step(1.0, 0.5));
         for i in 0..5 {
             tree.add("odom", "base", f64::from(i), step(f64::from(i), 0.1 * f64::from(i)));

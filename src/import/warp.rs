@@ -5,7 +5,7 @@ use image::RgbImage;
 use super::capture::{Layer, Normals};
 use super::decode;
 use super::optics::Optics;
-use super::view::View;
+use super::output_view::OutputView;
 use crate::error::Result;
 use crate::math::{Point, Pose, Vector, unit};
 use crate::recording::Grid;
@@ -15,7 +15,7 @@ use crate::recording::segments::Ends;
 const SAME_PLACE: f64 = 1e-4;
 
 /// Pixel of the source for each pixel of the output, row by row; `None` where the lens sees nothing.
-fn sources(view: &View, optics: &Optics) -> impl Iterator<Item = Option<(f64, f64)>> {
+fn sources(view: &OutputView, optics: &Optics) -> impl Iterator<Item = Option<(f64, f64)>> {
     let (width, height) = (view.camera.width, view.camera.height);
     let (view, optics) = (*view, *optics);
     (0..height).flat_map(move |y| (0..width).map(move |x| optics.project(&Point::from(view.ray(x as f64, y as f64)))))
@@ -23,7 +23,7 @@ fn sources(view: &View, optics: &Optics) -> impl Iterator<Item = Option<(f64, f6
 
 /// A colour image. Where the output is smaller, each of its pixels is the mean of as many of the source's as it covers.
 #[must_use]
-pub fn color(image: &RgbImage, view: &View, optics: &Optics) -> Vec<u8> {
+pub fn color(image: &RgbImage, view: &OutputView, optics: &Optics) -> Vec<u8> {
     let optics = optics.resized(image.width() as usize, image.height() as usize);
     let reach = (optics.fx / view.camera.fx).round().clamp(1.0, 16.0) as i64;
     let mut out = Vec::with_capacity(3 * view.camera.width * view.camera.height);
@@ -75,7 +75,7 @@ fn bilinear(image: &RgbImage, u: f64, v: f64) -> Option<[u8; 3]> {
 }
 
 /// The value of the nearest pixel; `none` where there is none. Never a mean: between two depths or classes lies no third.
-fn nearest<T: Copy>(grid: &Grid<T>, view: &View, optics: &Optics, none: T) -> Grid<T> {
+fn nearest<T: Copy>(grid: &Grid<T>, view: &OutputView, optics: &Optics, none: T) -> Grid<T> {
     let optics = optics.resized(grid.width, grid.height);
     let data = sources(view, &optics).map(|s| s.and_then(|(u, v)| grid.nearest(u, v)).unwrap_or(none)).collect();
     Grid { width: view.camera.width, height: view.camera.height, data }
@@ -98,7 +98,7 @@ pub fn depth(
     along_ray: bool,
     camera: DepthCamera,
     color_from_depth: Option<&Pose>,
-    view: &View,
+    view: &OutputView,
 ) -> Grid<f32> {
     let apart =
         color_from_depth.filter(|p| p.translation.vector.norm() > SAME_PLACE || p.rotation.angle() > SAME_PLACE);
@@ -156,7 +156,7 @@ fn reprojected(
     ray: impl Fn(usize, usize) -> Option<Vector>,
     focal: f64,
     color_from_depth: &Pose,
-    view: &View,
+    view: &OutputView,
 ) -> Grid<f32> {
     let camera = &view.camera;
     let output_from_source = view.source_from_output.inverse();
@@ -190,7 +190,7 @@ fn reprojected(
 ///
 /// # Errors
 /// Where a layer cannot be decoded, or has another shape than the colour image.
-pub fn mask(layers: &[Layer], view: &View, optics: &Optics) -> Result<Grid<u8>> {
+pub fn mask(layers: &[Layer], view: &OutputView, optics: &Optics) -> Result<Grid<u8>> {
     let mut out = Grid::filled(view.camera.width, view.camera.height, 0u8);
     for layer in layers {
         let (grid, class) = match layer {
@@ -249,7 +249,7 @@ fn columns(width: usize, height: usize, runs: &[u32]) -> Grid<u8> {
 ///
 /// # Errors
 /// Where the image cannot be decoded or has another shape than the colour image.
-pub fn normals(blob: &super::blob::Blob, how: &Normals, view: &View, optics: &Optics) -> Result<Vec<u8>> {
+pub fn normals(blob: &super::blob::Blob, how: &Normals, view: &OutputView, optics: &Optics) -> Result<Vec<u8>> {
     let image = decode::picture(blob)?.into_rgb8();
     let (width, height) = (image.width() as usize, image.height() as usize);
     if !optics.has_shape(width, height) {
@@ -276,7 +276,7 @@ pub fn normals(blob: &super::blob::Blob, how: &Normals, view: &View, optics: &Op
 
 /// Segments in pixels of the output; those with an end outside are left out.
 #[must_use]
-pub fn segments(segments: &[Ends], view: &View, optics: &Optics) -> Vec<Ends> {
+pub fn segments(segments: &[Ends], view: &OutputView, optics: &Optics) -> Vec<Ends> {
     let place = |end: &[f64; 2]| {
         let ray = view.source_from_output.inverse() * optics.direction(end[0], end[1])?;
         view.camera.project(&Point::from(ray)).filter(|&(u, v)| view.camera.contains(u, v)).map(|(u, v)| [u, v])
@@ -287,8 +287,8 @@ pub fn segments(segments: &[Ends], view: &View, optics: &Optics) -> Vec<Ends> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::import::Options;
-    use crate::import::optics::Lens;
+    use crate::import::ImportOptions;
+    use crate::import::optics::LensModel;
 
     fn optics() -> Optics {
         Optics::pinhole(64, 48, [40.0, 40.0, 31.5, 23.5])
@@ -297,9 +297,9 @@ mod tests {
     /// A wall before the camera: z = 2 at every pixel.
     #[test]
     fn a_wall_stays_a_wall_for_any_lens_and_either_measure() {
-        for lens in [Lens::Pinhole, Lens::Fisheye { k: [0.02, 0.0, 0.0, 0.0] }] {
+        for lens in [LensModel::Pinhole, LensModel::Fisheye { k: [0.02, 0.0, 0.0, 0.0] }] {
             let camera = Optics { lens, ..optics() };
-            let view = View::of(&camera, &Options { fov_deg: Some(60.0), ..Options::default() });
+            let view = OutputView::of(&camera, &ImportOptions { fov_deg: Some(60.0), ..ImportOptions::default() });
             let mut ranges = Grid::filled(64, 48, 2.0f32);
             for (i, r) in ranges.data.iter_mut().enumerate() {
                 let ray = camera.direction((i % 64) as f64, (i / 64) as f64).unwrap();
@@ -317,7 +317,7 @@ mod tests {
     fn depth_from_beside_covers_the_image_without_holes() {
         let color_from_depth = Pose::translation(0.05, 0.0, 0.1);
         let small = Grid::filled(32, 24, 2.0f32);
-        let view = View::of(&optics(), &Options::default());
+        let view = OutputView::of(&optics(), &ImportOptions::default());
         let out = depth(&small, false, DepthCamera::Optics(optics().resized(32, 24)), Some(&color_from_depth), &view);
         let middle = out.get(32, 24).unwrap();
         assert!((middle - 2.1).abs() < 1e-5, "{middle}");
@@ -334,7 +334,7 @@ mod tests {
     #[test]
     fn an_image_that_is_the_outputs_stays_as_it_is() {
         let image = RgbImage::from_fn(64, 48, |x, y| image::Rgb([x as u8, y as u8, 7]));
-        let view = View::of(&optics(), &Options::default());
+        let view = OutputView::of(&optics(), &ImportOptions::default());
         assert!(view.is_same(&optics()));
         assert_eq!(color(&image, &view, &optics()), image.into_raw());
     }

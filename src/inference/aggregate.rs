@@ -155,23 +155,20 @@ fn faces_agree(a: &Held, b: &Held, config: &config::Inference) -> bool {
 /// Whether the grips coincide when closed.
 fn same_place(a: &Held, b: &Held, config: &config::Inference) -> bool {
     // A part is opened and closed in turn: two openings in a row are two parts unless their grips nearly coincide.
-    let limit = if a.action == b.action { 0.6 * config.merge_grip_m } else { config.merge_grip_m };
+    let limit = if a.action == b.action { config.merge_same_action * config.merge_grip_m } else { config.merge_grip_m };
     faces_agree(a, b, config)
         && (a.closed - b.closed).norm() <= limit
-        && outlines_agree(a, b)
-        && hinges_agree(a.joint, b.joint)
+        && outlines_agree(a, b, config)
+        && hinges_agree(a.joint, b.joint, config)
 }
 
 /// Handles of neighbours can be a hand's width apart; the parts behind them do not overlap. An outline that was seen badly
 /// is too large rather than elsewhere, so the overlap is measured against the smaller one.
-fn outlines_agree(a: &Held, b: &Held) -> bool {
+fn outlines_agree(a: &Held, b: &Held, config: &config::Inference) -> bool {
     let (Some((face, mine)), Some((other_face, theirs))) = (&a.part, &b.part) else { return true };
     let shared = shared((face, mine), (other_face, theirs));
-    shared.of_smaller >= LEAST_SHARE
+    shared.of_smaller >= config.merge_shared
 }
-
-/// Of the smaller outline, on the larger one.
-const LEAST_SHARE: f64 = 0.5;
 
 /// How far two outlines overlap.
 struct Shared {
@@ -234,43 +231,46 @@ pub fn same_fronts(fronts: &[Option<Front>], config: &config::Inference) -> Vec<
 /// Both outlines are nearly one; or they overlap and each contains the other's grip: one that was seen badly may reach over a
 /// neighbour, which then is held outside of it. What lies deeper is another part, as a drawer behind a door.
 fn cover_one_place(a: &Front, b: &Front, config: &config::Inference) -> bool {
-    /// Of the faces, along the normal; two planes fitted to depth differ by a few centimetres.
-    const DEEPER_M: f64 = 0.08;
-    /// Grips are known this well at best.
-    const GRIP_M: f64 = 0.05;
-    /// Two drawers of one size seen as one share half of their union with each of them.
-    const NEARLY_ONE: f64 = 0.6;
     let holds = |on: &Front, grip: &Point| {
         let at = on.face.coordinates(grip);
-        (0..2).all(|k| at[k] >= on.rect.bounds[k][0] - GRIP_M && at[k] <= on.rect.bounds[k][1] + GRIP_M)
+        (0..2).all(|k| {
+            at[k] >= on.rect.bounds[k][0] - config.merge_beside_m
+                && at[k] <= on.rect.bounds[k][1] + config.merge_beside_m
+        })
     };
     let shared = shared((&a.face, &a.rect), (&b.face, &b.rect));
-    hinges_agree(a.joint, b.joint)
+    hinges_agree(a.joint, b.joint, config)
         && signed_angle(&a.face.normal, &b.face.normal) <= config.merge_angle_deg.to_radians()
-        && a.face.coordinates(&b.face.center)[2].abs() <= DEEPER_M
-        && (shared.iou >= NEARLY_ONE || (shared.of_smaller >= LEAST_SHARE && holds(a, &b.grip) && holds(b, &a.grip)))
+        && a.face.coordinates(&b.face.center)[2].abs() <= config.merge_deeper_m
+        && (shared.iou >= config.merge_nearly_one
+            || (shared.of_smaller >= config.merge_shared && holds(a, &b.grip) && holds(b, &a.grip)))
 }
 
 /// Two doors side by side are hinged at their outer edges: both hinges are sure and far apart.
-fn hinges_agree(a: Option<Articulation>, b: Option<Articulation>) -> bool {
+fn hinges_agree(a: Option<Articulation>, b: Option<Articulation>, config: &config::Inference) -> bool {
     let (Some(a), Some(b)) = (a, b) else { return true };
     if a.kind != JointKind::Revolute || b.kind != JointKind::Revolute {
         return true;
     }
-    unsigned_angle(&a.axis, &b.axis) > 45f64.to_radians() || a.line().distance(&b.origin) < 0.3
+    unsigned_angle(&a.axis, &b.axis) > config.merge_hinge_deg.to_radians()
+        || a.line().distance(&b.origin) < config.merge_hinge_m
 }
 
 /// Consensus about `seed`: of the joints of its type those that agree with it (10 degrees, 12 cm) are averaged, directions
 /// by PCA, origins where they pass the seed's.
 #[must_use]
 pub fn consensus(seed: &Articulation, joints: &[(Articulation, f64)]) -> Articulation {
+    /// Definition: what agrees, degrees and metres.
+    const ANGLE_DEG: f64 = 10.0;
+    /// Definition: the same of hinges, metres.
+    const HINGE_M: f64 = 0.12;
     let agreeing: Vec<(Articulation, f64)> = joints
         .iter()
         .filter(|(j, w)| {
             *w > 0.0
                 && j.kind == seed.kind
-                && unsigned_angle(&j.axis, &seed.axis) < 10f64.to_radians()
-                && (j.kind == JointKind::Prismatic || seed.line().distance(&j.origin) < 0.12)
+                && unsigned_angle(&j.axis, &seed.axis) < ANGLE_DEG.to_radians()
+                && (j.kind == JointKind::Prismatic || seed.line().distance(&j.origin) < HINGE_M)
         })
         .copied()
         .collect();

@@ -32,20 +32,17 @@ pub struct BareJoint {
     pub reason: String,
 }
 
-/// A part that turns by more than this has a hinge, whatever its path looks like: markers are read to a few degrees.
-const MIN_TURN_RAD: f64 = 0.26;
-/// One type is taken for sure where it is this much likelier than the other, nats: twenty to one, as in validation.
-const SURE_NATS: f64 = 3.0;
-
 /// Infers the joint of a bare trajectory.
 #[must_use]
 pub fn infer(trajectory: &BareTrajectory, config: &config::Inference) -> Outcome<BareJoint> {
-    let points = robust(&trajectory.positions);
+    let rules = &config.bare;
+    let points = robust(&trajectory.positions, rules);
     let Some(extent) = centroid(&points).map(|c| points.iter().map(|p| (p - c).norm()).fold(0.0, f64::max)) else {
         return Outcome::Abstained("no positions".to_owned());
     };
-    if points.len() < 5 {
-        return Outcome::Abstained(format!("{} positions, at least 5 are needed", points.len()));
+    if points.len() < rules.least_positions {
+        let least = rules.least_positions;
+        return Outcome::Abstained(format!("{} positions, at least {least} are needed", points.len()));
     }
     // Less travel than twice the paper's slide tolerance cannot be told from noise.
     if extent < config.prismatic_tolerance_m {
@@ -58,28 +55,31 @@ pub fn infer(trajectory: &BareTrajectory, config: &config::Inference) -> Outcome
         ));
     }
     let Some(slide) = slide(&points) else { return Outcome::Abstained("the points have no direction".to_owned()) };
-    let turn = turn(trajectory);
-    let (hinge, contradicted) = hinge(&points, turn.as_ref().filter(|t| t.angle >= MIN_TURN_RAD).map(|t| t.axis));
+    let turn = turn(trajectory, rules);
+    let turned = turn.as_ref().filter(|t| t.angle >= rules.turned_rad);
+    let (hinge, contradicted) = hinge(&points, turned.map(|t| t.axis), rules);
     let slide_residual = path::across(&points, &slide.axis).map_or(f64::INFINITY, f64::sqrt);
     let hinge_fit = hinge.and_then(|j| path::about_line(&points, &j.line()).map(|f| (j, f)));
-    let has_turned = turn.as_ref().is_some_and(|t| t.angle >= MIN_TURN_RAD);
-    if !has_turned && !bend::stands_out(&points, hinge_fit.map(|(_, f)| f.variance())) {
+    if turned.is_none() && !bend::stands_out(&points, hinge_fit.map(|(_, f)| f.variance()), rules) {
         return Outcome::Abstained(format!(
             "the points wander over {:.0} mm, hardly farther one way than another: nothing moved",
             2000.0 * extent
         ));
     }
-    let nats = bend::hinge_over_slide(&points, hinge.as_ref(), config.max_radius_m).unwrap_or(0.0);
+    let nats = bend::hinge_over_slide(&points, hinge.as_ref(), config).unwrap_or(0.0);
     let radius = hinge_fit.map(|(_, f)| f.radius);
 
     let (kind, ambiguous, mut reason) = match (&turn, radius) {
-        (Some(t), Some(_)) if t.angle >= MIN_TURN_RAD => {
-            (JointKind::Revolute, false, format!("the part itself turned by {:.0} deg", t.angle.to_degrees()))
+        (Some(t), Some(_)) if t.angle >= rules.turned_rad => {
+            (JointKind::Revolute, false, format!("the part itself turned by {:.0} deg", t.whole.to_degrees()))
         }
-        (Some(t), _) if extent > 0.1 && t.angle < MIN_TURN_RAD => {
-            (JointKind::Prismatic, false, format!("the part itself turned by only {:.0} deg", t.angle.to_degrees()))
+        (Some(t), _) if extent > rules.slid_m && t.angle < rules.turned_rad => {
+            (JointKind::Prismatic, false, format!("the part itself turned by only {:.0} deg", t.whole.to_degrees()))
         }
-        (_, radius) => by_the_path(nats, radius, config.max_radius_m),
+        (_, radius) => {
+            let beside = [Some(slide_residual), hinge_fit.map(|(_, f)| f.variance().sqrt())];
+            by_the_path(nats, radius, beside.map(|m| m.unwrap_or(f64::INFINITY)), config)
+        }
     };
     if contradicted {
         reason += "; the orientations turn about another axis than the path does: is w written first? Name the columns";
@@ -90,7 +90,7 @@ pub fn infer(trajectory: &BareTrajectory, config: &config::Inference) -> Outcome
     };
     let first = points[0];
     let openings = super::openings(&joint, &first, &points);
-    let range = bend::range(&joint, &openings, radius.unwrap_or(1.0), residual_m);
+    let range = bend::range(&joint, &openings, radius.unwrap_or(1.0), residual_m, rules);
     let sense = openings.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
     let joint = if sense < 0.0 { joint.reversed() } else { joint };
     Outcome::Found(BareJoint {
@@ -99,23 +99,26 @@ pub fn infer(trajectory: &BareTrajectory, config: &config::Inference) -> Outcome
         residual_m,
         other_residual_m,
         circle_radius_m: radius,
-        turn_rad: turn.map(|t| t.angle),
+        turn_rad: turn.map(|t| t.whole),
         ambiguous,
         reason,
     })
 }
 
 /// Type, whether it is ambiguous, and why, by how much likelier a hinge makes the path than a slide (nats). Where neither is
-/// surely better the simpler one is taken.
-fn by_the_path(nats: f64, radius: Option<f64>, max_radius_m: f64) -> (JointKind, bool, String) {
-    if let Some(r) = radius.filter(|r| *r <= max_radius_m && nats >= SURE_NATS) {
+/// surely better the simpler one is taken. `beside_m`: how far the points are from the best slide's path and from their own circle.
+fn by_the_path(
+    nats: f64,
+    radius: Option<f64>,
+    beside_m: [f64; 2],
+    config: &config::Inference,
+) -> (JointKind, bool, String) {
+    let (max_radius_m, sure) = (config.max_radius_m, config.bare.sure_nats);
+    if let Some(r) = radius.filter(|r| *r <= max_radius_m && nats >= sure) {
         return (JointKind::Revolute, false, format!("a circle of radius {r:.2} m explains the points"));
     }
-    if nats > -SURE_NATS {
-        // Where the points' own circle is wider than any door, the widest door was compared.
-        let r = radius.unwrap_or(max_radius_m).min(max_radius_m);
-        let text = format!("a line and a circle of radius {r:.2} m both explain the points; the simpler one is taken");
-        return (JointKind::Prismatic, true, text);
+    if nats > -sure {
+        return (JointKind::Prismatic, true, undecided(radius, beside_m, config));
     }
     match radius {
         // A hook that slips on a sliding door bends its path, but no door is this wide.
@@ -127,15 +130,47 @@ fn by_the_path(nats: f64, radius: Option<f64>, max_radius_m: f64) -> (JointKind,
     }
 }
 
-struct Turn {
-    axis: Vector,
-    angle: f64,
+/// Why neither type is surely the better one, in words.
+fn undecided(radius: Option<f64>, [line_m, circle_m]: [f64; 2], config: &config::Inference) -> String {
+    let (max_radius_m, explains_m) = (config.max_radius_m, config.bare.explains_m);
+    let own = radius.unwrap_or(max_radius_m);
+    match (line_m <= explains_m, circle_m <= explains_m) {
+        // Where the points' own circle is wider than any door, the widest door was compared.
+        (true, true) => format!(
+            "a line and a circle of radius {:.2} m both explain the points; the simpler one is taken",
+            own.min(max_radius_m)
+        ),
+        (true, false) => "a line explains the points, but not surely better than a circle".to_owned(),
+        (false, true) if own > max_radius_m => format!(
+            "no line explains the points ({:.0} cm beside), and their circle has a radius of {own:.2} m, wider than any door: is \
+             the unit right?",
+            100.0 * line_m
+        ),
+        (false, true) => {
+            format!("a circle of radius {own:.2} m explains the points, but not surely better than a line")
+        }
+        (false, false) => format!(
+            "neither a line nor a circle explains the points ({:.0} and {:.0} cm beside); the simpler one is taken",
+            100.0 * line_m,
+            100.0 * circle_m
+        ),
+    }
 }
 
-/// Rotation between the orientations at the two ends of the motion: medians over many pairs. `None` without orientations.
-fn turn(trajectory: &BareTrajectory) -> Option<Turn> {
+/// How the recorded orientations turned.
+struct Turn {
+    /// About this, unit.
+    axis: Vector,
+    /// Between the two ends of the motion, medians over many pairs, radians: what a decision rests on.
+    angle: f64,
+    /// Over the whole motion, radians.
+    whole: f64,
+}
+
+/// Rotation between the orientations at the two ends of the motion, and over all of it. `None` without orientations.
+fn turn(trajectory: &BareTrajectory, rules: &config::Bare) -> Option<Turn> {
     let q = &trajectory.orientations;
-    if q.len() != trajectory.positions.len() || q.len() < 10 {
+    if q.len() != trajectory.positions.len() || q.len() < rules.least_orientations {
         return None;
     }
     // The farthest tenth of the samples against the tenth nearest to the start.
@@ -153,7 +188,18 @@ fn turn(trajectory: &BareTrajectory) -> Option<Turn> {
             axes.push((axis.into_inner(), relative.angle()));
         }
     }
-    Some(Turn { axis: super::mean_direction(&axes)?, angle: stats::median(&angles)? })
+    let axis = super::mean_direction(&axes)?;
+    let first = q.first()?.inverse();
+    let about: Vec<f64> = q
+        .iter()
+        .map(|q| {
+            let relative = (q * first).into_inner();
+            2.0 * axis.dot(&relative.imag()).atan2(relative.scalar())
+        })
+        .collect();
+    let joint = Articulation { kind: JointKind::Revolute, axis, origin: start };
+    let whole = bend::range(&joint, &stats::unwrap_angles(&about), 1.0, f64::INFINITY, rules);
+    Some(Turn { axis, angle: stats::median(&angles)?, whole })
 }
 
 fn slide(points: &[Point]) -> Option<Articulation> {
@@ -164,20 +210,22 @@ fn slide(points: &[Point]) -> Option<Articulation> {
 
 /// The circle about the direction in which the orientations turned, else in the points' own plane; and whether the two
 /// contradict each other, which makes the points' own the better one.
-fn hinge(points: &[Point], turned: Option<Vector>) -> (Option<Articulation>, bool) {
+fn hinge(points: &[Point], turned: Option<Vector>, rules: &config::Bare) -> (Option<Articulation>, bool) {
     let own = Plane::fit(points).and_then(|plane| arc_about(points, &plane.normal));
     let Some(direction) = turned else { return (own, false) };
     let about = arc_about(points, &direction);
     let off = |joint: &Articulation| path::about_line(points, &joint.line()).map_or(f64::INFINITY, |f| f.variance());
-    // Points that leave their own circle less than half as far know its plane better than the orientations do.
     let contradicted = own.as_ref().is_some_and(|own| {
-        bend::contradicts(&direction, &own.axis) && about.as_ref().is_none_or(|about| 4.0 * off(own) < off(about))
+        bend::contradicts(&direction, &own.axis, rules)
+            && about.as_ref().is_none_or(|about| rules.own_circle * off(own) < off(about))
     });
     if contradicted { (own, true) } else { (about.or(own), false) }
 }
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::UnitQuaternion;
+
     use super::*;
 
     fn bare(points: Vec<Point>) -> BareTrajectory {
@@ -288,6 +336,34 @@ mod tests {
         assert!(found.reason().is_some_and(|r| r.contains("nothing moved")), "{found:?}");
         let found = infer(&bare(shaken(&arc(120, 330.0), 0.005)), &config::Inference::default());
         assert!(found.found().is_some_and(|j| j.joint.kind == JointKind::Revolute), "{found:?}");
+    }
+
+    #[test]
+    fn the_turn_that_is_told_is_that_of_the_whole_motion() {
+        let turned = |degrees: f64| -> BareTrajectory {
+            let at = |i: u32| UnitQuaternion::from_euler_angles(0.2, -0.3, degrees.to_radians() * f64::from(i) / 61.0);
+            // Of the two quaternions of a rotation either may be written.
+            let sign = |i: u32| if i.is_multiple_of(2) { 1.0 } else { -1.0 };
+            let orientations = (0..62).map(|i| UnitQuaternion::new_unchecked(at(i).into_inner() * sign(i))).collect();
+            BareTrajectory { positions: arc(62, degrees), orientations, ..Default::default() }
+        };
+        for degrees in [30.0, 69.0, 110.0] {
+            let found = infer(&turned(degrees), &config::Inference::default());
+            let joint = found.found().unwrap();
+            assert_eq!(joint.reason, format!("the part itself turned by {degrees:.0} deg"));
+            assert!(joint.turn_rad.is_some_and(|t| (t.to_degrees() - degrees).abs() < 0.1), "{:?}", joint.turn_rad);
+        }
+    }
+
+    #[test]
+    fn a_type_from_which_the_points_are_far_does_not_explain_them() {
+        let feet: Vec<Point> = arc(62, 69.0).iter().map(|p| p / 0.3048).collect();
+        let found = infer(&bare(feet), &config::Inference::default());
+        let joint = found.found().unwrap();
+        assert!(!joint.reason.contains("both explain"), "{}", joint.reason);
+        let said = |beside: [f64; 2]| undecided(Some(1.8), beside, &config::Inference::default());
+        assert!(said([0.01, 0.0]).contains("both explain") && said([0.1, 0.0]).contains("is the unit right?"));
+        assert!(said([0.01, 0.2]).contains("a line explains") && said([0.1, 0.2]).contains("neither"));
     }
 
     #[test]

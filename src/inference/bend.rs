@@ -3,13 +3,8 @@
 use nalgebra::Vector2;
 
 use crate::articulation::{Articulation, JointKind};
+use crate::config;
 use crate::math::{Point, Vector, centroid, principal_directions, stats};
-
-/// Rails and hinges have play: no mechanism is straighter or rounder than this, metres.
-const PLAY_M: f64 = 1e-3;
-/// Independent samples that one motion is worth, at most: errors of hand and mechanism last for a good part of it. The same
-/// as in validation.
-const MOST_SAMPLES: f64 = 8.0;
 
 /// What lies beside a path's model at each point, along the two directions that the model leaves free of motion, metres.
 type Beside = Vec<Vector2<f64>>;
@@ -73,19 +68,24 @@ fn mean_square(beside: &[Vector2<f64>]) -> f64 {
 }
 
 /// How many independent samples a path is worth whose errors are these: neighbours that err alike are one.
-fn effective_samples(beside: &[Vector2<f64>]) -> f64 {
+fn effective_samples(beside: &[Vector2<f64>], rules: &config::Bare) -> f64 {
     let n = beside.len() as f64;
     let together: f64 = beside.iter().zip(beside.iter().skip(1)).map(|(a, b)| a.dot(b)).sum();
-    let alone = n * (mean_square(beside) + PLAY_M * PLAY_M);
+    let alone = n * (mean_square(beside) + rules.play_m * rules.play_m);
     let correlation = (together / alone).clamp(0.0, 0.99);
-    (n * (1.0 - correlation) / (1.0 + correlation)).min(n).clamp(1.0, MOST_SAMPLES)
+    (n * (1.0 - correlation) / (1.0 + correlation)).min(n).clamp(1.0, rules.effective_samples)
 }
 
 /// How much more likely a hinge makes a path than a slide does, nats; negative where the slide does better. Both have their
 /// best place; the hinge is no wider than `max_radius_m` (else every slide is one), and pays for its two further numbers as
 /// the Bayesian information criterion has it. The noise is that of the better of the two, never below the play of a
 /// mechanism. `None` for points without a direction.
-pub(super) fn hinge_over_slide(points: &[Point], hinge: Option<&Articulation>, max_radius_m: f64) -> Option<f64> {
+pub(super) fn hinge_over_slide(
+    points: &[Point],
+    hinge: Option<&Articulation>,
+    config: &config::Inference,
+) -> Option<f64> {
+    let (max_radius_m, rules) = (config.max_radius_m, &config.bare);
     let path = Straightened::of(points)?;
     let mut round = path.beside_arc(max_radius_m)?;
     if let Some(hinge) = hinge {
@@ -96,8 +96,8 @@ pub(super) fn hinge_over_slide(points: &[Point], hinge: Option<&Articulation>, m
         }
     }
     let (straight_m2, round_m2) = (mean_square(&path.beside), mean_square(&round));
-    let samples = effective_samples(if straight_m2 < round_m2 { &path.beside } else { &round });
-    let play = PLAY_M * PLAY_M;
+    let samples = effective_samples(if straight_m2 < round_m2 { &path.beside } else { &round }, rules);
+    let play = rules.play_m * rules.play_m;
     Some(samples * ((straight_m2 + play) / (round_m2 + play)).ln() - samples.ln())
 }
 
@@ -114,12 +114,11 @@ pub(super) fn progresses(points: &[Point]) -> bool {
 /// Whether a path goes somewhere rather than about: three times as far along a line as beside it, as variances go, or, where it
 /// is round, ten times as far as beside its circle (`round_m2`, square metres), which fits any cloud better than a line does. A
 /// still hand that drifts as its camera does stays below both.
-pub(super) fn stands_out(points: &[Point], round_m2: Option<f64>) -> bool {
-    const LINE: f64 = 3.0;
-    const CIRCLE: f64 = 10.0;
+pub(super) fn stands_out(points: &[Point], round_m2: Option<f64>, rules: &config::Bare) -> bool {
     let Some(path) = Straightened::of(points) else { return false };
     let along = path.along.iter().map(|u| u * u).sum::<f64>() / path.along.len() as f64;
-    along > LINE * mean_square(&path.beside) || round_m2.is_some_and(|beside| along > CIRCLE * beside)
+    along > rules.along_line * mean_square(&path.beside)
+        || round_m2.is_some_and(|beside| along > rules.along_circle * beside)
 }
 
 /// The opening that a path goes through, rad or m. `beside_m` is what lies beside the joint's path (root mean square).
@@ -127,8 +126,8 @@ pub(super) fn stands_out(points: &[Point], round_m2: Option<f64>) -> bool {
 /// All of the path counts. Of a hundred samples one is given up at an end where it stands apart from the others, or where the
 /// samples jump about by more than the motion goes from one to the next. Noise makes the extreme of many samples go too far:
 /// each end is the mean of the samples that are within two of its standard deviations.
-pub(super) fn range(joint: &Articulation, openings: &[f64], lever_m: f64, beside_m: f64) -> f64 {
-    let lever = if joint.kind == JointKind::Revolute { lever_m.max(PLAY_M) } else { 1.0 };
+pub(super) fn range(joint: &Articulation, openings: &[f64], lever_m: f64, beside_m: f64, rules: &config::Bare) -> f64 {
+    let lever = if joint.kind == JointKind::Revolute { lever_m.max(rules.play_m) } else { 1.0 };
     let noise = own_noise(openings).min(beside_m / std::f64::consts::SQRT_2 / lever);
     let mut sorted = openings.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -151,7 +150,7 @@ pub(super) fn range(joint: &Articulation, openings: &[f64], lever_m: f64, beside
 
 /// Standard deviation of the noise of a series by its second differences: a motion has next to none of them.
 fn own_noise(values: &[f64]) -> f64 {
-    // Median of the absolute value of a normal variable; and the second difference of white noise.
+    /// Arithmetic: median of the absolute value of a normal variable. Its second difference varies by 6.
     const MEDIAN: f64 = 0.6745;
     let bends: Vec<f64> = values.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
     stats::median(&bends).unwrap_or(0.0) / MEDIAN / 6f64.sqrt()
@@ -159,10 +158,9 @@ fn own_noise(values: &[f64]) -> f64 {
 
 /// The points without single jumps: one that is several steps away from the median of its neighbourhood is put there.
 /// All others stay as they are: the ends of few samples are the ends of the motion.
-pub(crate) fn robust(points: &[Point]) -> Vec<Point> {
+pub(crate) fn robust(points: &[Point], rules: &config::Bare) -> Vec<Point> {
+    /// Arithmetic: of two neighbours on each side the median is not moved by one.
     const REACH: usize = 2;
-    // Neither a turn nor a noisy hand goes as many steps away from its neighbours.
-    const STEPS: f64 = 4.0;
     let steps: Vec<f64> = points.windows(2).map(|w| (w[1] - w[0]).norm()).collect();
     let usual = stats::median(&steps).unwrap_or(0.0);
     let around = |i: usize, reach: usize, end: usize| i.saturating_sub(reach)..(i + reach + 1).min(end);
@@ -174,14 +172,13 @@ pub(crate) fn robust(points: &[Point]) -> Vec<Point> {
             let middle = Point::new(coordinate(0), coordinate(1), coordinate(2));
             let near = steps.get(i.saturating_sub(REACH + 1)..(i + REACH + 1).min(steps.len())).unwrap_or_default();
             let step = stats::median(near).unwrap_or(0.0).max(usual);
-            if (points[i] - middle).norm() > STEPS * step { middle } else { points[i] }
+            if (points[i] - middle).norm() > rules.jump_steps * step { middle } else { points[i] }
         })
         .collect()
 }
 
 /// The direction in which a path's orientations turn is another than that in which the path itself bends, by more than
 /// markers are wrong: about 30 degrees.
-pub(super) fn contradicts(turn: &Vector, normal: &Vector) -> bool {
-    const FAR_RAD: f64 = 0.52;
-    crate::math::unsigned_angle(turn, normal) > FAR_RAD
+pub(super) fn contradicts(turn: &Vector, normal: &Vector, rules: &config::Bare) -> bool {
+    crate::math::unsigned_angle(turn, normal) > rules.contradicts_rad
 }

@@ -57,11 +57,9 @@ pub fn infer(
     reasoning: &config::Reasoning,
     config: &config::Inference,
 ) -> Outcome<ClipJoint> {
-    // Less is the trembling of a hand that holds still.
-    const MIN_EXTENT_M: f64 = 0.03;
     let positions = trajectory.positions();
     let extent = positions.iter().map(|p| (p - positions[0]).norm()).fold(0.0, f64::max);
-    if extent < MIN_EXTENT_M && !vouched_for {
+    if extent < config.least_extent_m && !vouched_for {
         return Outcome::Abstained(format!("the hand in contact moved by only {:.1} cm", 100.0 * extent));
     }
     let revolute_probability = answer.revolute_probability(candidates);
@@ -138,11 +136,14 @@ pub fn torus_tolerance(radius: f64, config: &config::Inference) -> f64 {
     (config.torus_tolerance_ratio * radius).clamp(config.torus_tolerance_min_m, config.torus_tolerance_max_m)
 }
 
+/// Definition: share of a path's samples that are left out at each end where its opening is read off.
+pub(crate) const ENDS: f64 = 0.03;
+
 /// Opening that the path goes through: from the closed to the open end without the extreme 3 % of the samples, rad or m.
 #[must_use]
 pub fn observed_range(joint: &Articulation, grip: &Point, path: &[Point]) -> f64 {
     let openings = openings(joint, grip, path);
-    let (low, high) = (stats::quantile(&openings, 0.03), stats::quantile(&openings, 0.97));
+    let [low, high] = [ENDS, 1.0 - ENDS].map(|q| stats::quantile(&openings, q));
     low.zip(high).map_or(0.0, |(low, high)| high - low)
 }
 
@@ -229,14 +230,20 @@ pub fn agreeing_share(best: &Articulation, all: &[(Articulation, f64)]) -> f64 {
 /// them: of its type, directions within 15 degrees, the true hinge within 25 cm of the answer's line.
 #[must_use]
 pub fn is_right(answer: &Articulation, other: &Articulation) -> bool {
+    /// Definition (§4), degrees and metres.
     const ANGLE_DEG: f64 = 15.0;
+    /// Definition: the same of hinges, metres.
     const HINGE_M: f64 = 0.25;
     answer.kind == other.kind && near(answer, other, ANGLE_DEG, HINGE_M)
 }
 
 /// Whether two joints are one explanation: hand and depth seldom tell joints apart that are within 8 degrees and 8 cm.
 fn same_axis(a: &Articulation, b: &Articulation) -> bool {
-    near(a, b, 8.0, 0.08)
+    /// Definition: what the probability of a joint is the probability of, degrees and metres.
+    const ANGLE_DEG: f64 = 8.0;
+    /// Definition: the same of hinges, metres.
+    const HINGE_M: f64 = 0.08;
+    near(a, b, ANGLE_DEG, HINGE_M)
 }
 
 /// Whether directions without sign, and the lines of hinges, are within these.

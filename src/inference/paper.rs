@@ -132,15 +132,13 @@ fn slide<'a>(
 /// The direction of the hand's motion `v_h`, unit, either sense, and the share of the samples that lie on its line: by RANSAC
 /// within the slide's tolerance, and PCA of what lies there (§3.4, §B.1).
 fn pull(path: &[Point], config: &config::Inference, seed: u64) -> Option<(Vector, f64)> {
-    /// As of the lines of furniture; with half of the samples off, no clean pair is drawn once in ten million.
-    const DRAWS: usize = 60;
     let along = |points: &[Point]| -> Option<Line> {
         let (axes, _) = principal_directions(points)?;
         Some(Line { point: centroid(points)?, direction: axes.column(0).into_owned() })
     };
     let found = lo_ransac::<Line, 2>(
         path.len(),
-        Search { draws: DRAWS, tolerance: config.prismatic_tolerance_m, seed },
+        Search { draws: config.prismatic_draws, tolerance: config.prismatic_tolerance_m, seed },
         |pair| Segment::between(&path[pair[0]], &path[pair[1]]).map(|s| s.line),
         |ids| along(&ids.iter().map(|&i| path[i]).collect::<Vec<_>>()),
         |line, i| line.distance(&path[i]),

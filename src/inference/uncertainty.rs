@@ -4,9 +4,10 @@
 //!
 //! - An axis of a face or of the room has the error of such a frame: a prior. The hand chose the axis and did not turn
 //!   it.
+//! - An axis of a front that the hand alone suggests: upright as fronts are, its heading as the hand's path tells it.
 //! - A free axis: the prior of its line times what the hands' paths say, a Laplace approximation: the Fisher information
 //!   of an evenly drawn arc or pull.
-//! - A hinge whose open state was seen: the fit of `geometry::openings`, a Laplace approximation (the normal matrix where
+//! - A hinge whose open state was seen: the fit of `part::openings`, a Laplace approximation (the normal matrix where
 //!   the fit ended, its robust weights held) under the priors that it has: the front's plane, the hand's noise, and a line
 //!   along the part's side where there is one.
 //! - Any other hinge: the prior of its source times what the hands' arcs say of their centre, the radius free: a Laplace
@@ -19,10 +20,9 @@
 use nalgebra::{Matrix2, Matrix3, Vector2};
 use serde::{Deserialize, Serialize};
 
-use super::{ClipJoint, openings};
+use super::{ClipJoint, ENDS, openings};
 use crate::articulation::{Articulation, JointKind};
 use crate::config;
-use crate::geometry::openings::LEAST_LEVER_M;
 use crate::geometry::{AxisCandidate, AxisSource, Face};
 use crate::hands::{self, Trajectory};
 use crate::math::{Point, Vector, any_orthogonal, reject, rotation, stats, unit};
@@ -102,7 +102,7 @@ pub fn sigmas(covariance: &Covariance, error: [f64; 2]) -> Option<f64> {
 /// The two directions of [`Uncertainty::across`] for a unit axis.
 #[must_use]
 pub fn across(axis: &Vector, face: Option<&Face>) -> [Vector; 2] {
-    // An axis at more than 45 degrees to the face leaves it.
+    /// Geometry: an axis at more than 45 degrees to the face leaves it.
     const LEAVES: f64 = std::f64::consts::FRAC_1_SQRT_2;
     let first = face
         .map(|f| if axis.dot(&f.normal).abs() < LEAVES { f.normal } else { f.up })
@@ -151,11 +151,14 @@ pub fn chosen(joint: &ClipJoint, candidates: &[AxisCandidate]) -> AxisCandidate 
 
 /// How sure a joint is; `None` without a hand, and where a number is lost to rounding.
 #[must_use]
-pub fn of(evidence: &Evidence, reasoning: &config::Reasoning) -> Option<Uncertainty> {
+pub fn of(evidence: &Evidence, reasoning: &config::Reasoning, part: &config::Part) -> Option<Uncertainty> {
     let Evidence { joint, chosen, hands, depth, .. } = *evidence;
     let across = across(&joint.axis, evidence.face);
     let paths: Vec<Vec<Point>> = hands.iter().filter(|_| evidence.settled).map(|hand| hand.positions()).collect();
-    let axis = axis_information(joint, chosen, &paths, &across, reasoning).try_inverse()?;
+    let axis = match evidence.face.filter(|f| f.is_assumed()) {
+        Some(face) => heading_information(joint, face, &paths, &across, reasoning).try_inverse()?,
+        None => axis_information(joint, chosen, &paths, &across, reasoning).try_inverse()?,
+    };
     let origin = match joint.kind {
         JointKind::Prismatic => None,
         JointKind::Revolute => Some(match depth.and_then(|d| Some((d.across, d.hinge_cov_m2?))) {
@@ -169,7 +172,7 @@ pub fn of(evidence: &Evidence, reasoning: &config::Reasoning) -> Option<Uncertai
         .map(|(i, hand)| {
             let seen = depth.and_then(|d| d.moved_std.get(i).copied());
             seen.filter(|std| std.is_finite() && *std > 0.0)
-                .unwrap_or_else(|| hand_range_std(joint, hand, &across, origin.as_ref()))
+                .unwrap_or_else(|| hand_range_std(joint, hand, &across, origin.as_ref(), part.least_lever_m))
         })
         .collect();
     let largest = evidence.moved.iter().zip(&moved_std).max_by(|a, b| a.0.total_cmp(b.0));
@@ -194,14 +197,6 @@ fn turned(covariance: &Covariance, from: &[Vector; 2], to: &[Vector; 2]) -> Matr
     turn * Matrix2::new(a, b, c, d) * turn.transpose()
 }
 
-/// How well a face's and the room's axes are known about each of two directions across them. Normals with fifteen degrees of
-/// noise leave the room's frame to a degree, and gravity, to which fronts are set upright, is known no better.
-const FRAME_STD_RAD: f64 = std::f64::consts::PI / 180.0;
-/// The same of a 3D line's own direction: ends half a metre apart, each off by a centimetre.
-const LINE_STD_RAD: f64 = 0.03;
-/// The same where only the hand tells the direction: the largest tilt that a covariance can speak of.
-const FREE_STD_RAD: f64 = 0.5;
-
 /// Information about the axis' turns about the two directions, rad^-2.
 fn axis_information(
     joint: &Articulation,
@@ -212,9 +207,9 @@ fn axis_information(
 ) -> Matrix2<f64> {
     // A line at a face has a side, and the face's direction.
     let (prior_std, free) = match (chosen.source, chosen.side) {
-        (AxisSource::Line, None) => (LINE_STD_RAD, true),
-        (AxisSource::HandPath, _) => (FREE_STD_RAD, true),
-        _ => (FRAME_STD_RAD, false),
+        (AxisSource::Line, None) => (reasoning.directions.line_std_rad, true),
+        (AxisSource::HandPath, _) => (reasoning.directions.free_std_rad, true),
+        _ => (reasoning.directions.frame_std_deg.to_radians(), false),
     };
     let prior = Matrix2::identity() * prior_std.powi(-2);
     paths.iter().filter(|_| free).fold(prior, |sum, path| {
@@ -224,6 +219,30 @@ fn axis_information(
         };
         sum + each * worth(path, reasoning)
     })
+}
+
+/// The same for an axis of a front that the hand suggests: it stands upright as furniture does, and which way it looks the hand
+/// tells. An upright axis has no heading.
+fn heading_information(
+    joint: &Articulation,
+    face: &Face,
+    paths: &[Vec<Point>],
+    across: &[Vector; 2],
+    reasoning: &config::Reasoning,
+) -> Matrix2<f64> {
+    let vertical = if face.normal.z.abs() > face.up.z.abs() { face.normal } else { face.up };
+    let told = paths.iter().fold(Matrix2::zeros(), |sum: Matrix2<f64>, path| {
+        let each = match joint.kind {
+            JointKind::Revolute => Arc::of(path, joint, across).map_or_else(Matrix2::zeros, |arc| arc.of_tilt()),
+            JointKind::Prismatic => of_pull(path, joint),
+        };
+        sum + each * worth(path, reasoning)
+    });
+    let known = |k: usize| match across[k].dot(&vertical).abs() > std::f64::consts::FRAC_1_SQRT_2 {
+        true => reasoning.directions.free_std_rad.powi(-2) + told[(k, k)],
+        false => reasoning.directions.frame_std_deg.to_radians().powi(-2),
+    };
+    Matrix2::from_diagonal(&Vector2::new(known(0), known(1)))
 }
 
 /// Information about the hinge along the two directions, m^-2.
@@ -250,7 +269,7 @@ fn worth(path: &[Point], reasoning: &config::Reasoning) -> f64 {
 /// [`super::observed_range`].
 fn extent(path: &[Point], joint: &Articulation) -> Option<[f64; 2]> {
     let all = openings(joint, path.first()?, path);
-    Some([stats::quantile(&all, 0.03)?, stats::quantile(&all, 0.97)?])
+    Some([stats::quantile(&all, ENDS)?, stats::quantile(&all, 1.0 - ENDS)?])
 }
 
 /// Information that one sample (of unit variance) of an even pull holds about the direction's turns: the variance of a
@@ -287,7 +306,7 @@ impl Arc {
     /// Variance of the points of the unit arc, towards its middle and along its chord.
     fn spread(&self) -> [f64; 2] {
         let half = self.half_angle;
-        // Below this the closed form is rounding.
+        // Arithmetic: below this the closed form is rounding.
         if half < 1e-3 {
             return [0.0, half * half / 3.0];
         }
@@ -316,18 +335,25 @@ impl Arc {
     }
 }
 
-/// Standard deviation of the opening that a clip went through as its hand tells it, rad or m. As in `geometry::openings` the
+/// Standard deviation of the opening that a clip went through as its hand tells it, rad or m. As in `part::openings` the
 /// hand is off by as much all along a clip; an open end that was not seen adds the way that it may still have gone.
-fn hand_range_std(joint: &Articulation, hand: &Trajectory, across: &[Vector; 2], origin: Option<&Matrix2<f64>>) -> f64 {
+/// `least_lever_m`: hands hold parts no nearer to their hinge.
+fn hand_range_std(
+    joint: &Articulation,
+    hand: &Trajectory,
+    across: &[Vector; 2],
+    origin: Option<&Matrix2<f64>>,
+    least_lever_m: f64,
+) -> f64 {
     let [closed, open] = [hand.closed_grip(), hand.open_grip()];
     let closed_m = hands::grip_std_m(hand.closed_end_seen());
     let grip_m = if hand.open_end_seen() { closed_m } else { closed_m.hypot(hands::grip_std_m(false)) };
-    let by_grip = grip_m / joint.lever(&closed).max(LEAST_LEVER_M);
+    let by_grip = grip_m / joint.lever(&closed).max(least_lever_m);
     let by_hinge = origin.map_or(0.0, |covariance| {
         // How the direction from the hinge to a grip turns when the hinge moves.
         let turn = |grip: &Point| {
             let ray = reject(&(grip - joint.origin), &joint.axis);
-            let by = joint.axis.cross(&ray) / ray.norm().max(LEAST_LEVER_M).powi(2);
+            let by = joint.axis.cross(&ray) / ray.norm().max(least_lever_m).powi(2);
             Vector2::new(by.dot(&across[0]), by.dot(&across[1]))
         };
         let gradient = turn(&closed) - turn(&open);
@@ -345,6 +371,10 @@ mod tests {
     use nalgebra::Point2;
     use rand::SeedableRng;
     use rand_distr::{Distribution, Normal};
+
+    /// `reasoning.directions.frame_std_deg` and `free_std_rad`.
+    const FRAME_STD_RAD: f64 = std::f64::consts::PI / 180.0;
+    const FREE_STD_RAD: f64 = 0.5;
 
     /// An upright hinge at the origin and a front to its right that looks to -y.
     fn door() -> Articulation {
@@ -385,7 +415,7 @@ mod tests {
         let (chosen, face) = (AxisCandidate::new(*joint, source), face());
         let evidence =
             Evidence { joint, chosen: &chosen, face: Some(&face), hands, settled: true, moved: &moved, depth };
-        of(&evidence, &config::Reasoning::default()).unwrap()
+        of(&evidence, &config::Reasoning::default(), &config::Part::default()).unwrap()
     }
 
     #[test]
@@ -451,6 +481,32 @@ mod tests {
     }
 
     #[test]
+    fn the_heading_of_an_assumed_front_is_as_good_as_the_pull_and_upright_axes_stay_upright() {
+        let drawer = Articulation { kind: JointKind::Prismatic, axis: -Vector::y(), origin: Point::origin() };
+        let assumed = Face { support: 0.0, ..face() };
+        let axis_std = |joint: &Articulation, source: AxisSource, travel: f64| {
+            let (chosen, hand) = (AxisCandidate::new(*joint, source), hand(joint, travel, true));
+            let moved = [travel];
+            let evidence = Evidence {
+                joint,
+                chosen: &chosen,
+                face: Some(&assumed),
+                hands: &[&hand],
+                settled: true,
+                moved: &moved,
+                depth: None,
+            };
+            let covariance =
+                of(&evidence, &config::Reasoning::default(), &config::Part::default()).unwrap().axis_cov_rad2;
+            [covariance[0][0].sqrt(), covariance[1][1].sqrt()]
+        };
+        let largest = |[a, b]: [f64; 2]| a.max(b);
+        let [short, long] = [0.1, 0.4].map(|travel| largest(axis_std(&drawer, AxisSource::FaceNormal, travel)));
+        assert!(long < 0.4 * short && long > 2.0 * FRAME_STD_RAD, "{short} {long}");
+        assert!(largest(axis_std(&door(), AxisSource::HandArc, 1.0)) < 1.01 * FRAME_STD_RAD);
+    }
+
+    #[test]
     fn what_depth_told_stands_and_its_directions_are_turned_to_the_faces() {
         let hand = hand(&door(), 1.0, true);
         let across = across(&door().axis, Some(&face()));
@@ -475,7 +531,7 @@ mod tests {
         let (joint, chosen) = (door(), AxisCandidate::new(door(), AxisSource::Line));
         let nobody =
             Evidence { joint: &joint, chosen: &chosen, face: None, hands: &[], settled: true, moved: &[], depth: None };
-        assert_eq!(of(&nobody, &config::Reasoning::default()), None);
+        assert_eq!(of(&nobody, &config::Reasoning::default(), &config::Part::default()), None);
     }
 
     #[test]

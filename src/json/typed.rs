@@ -11,19 +11,19 @@ pub(super) const WHOLE: &str = "the whole file";
 
 /// The first place where `value` is no `T`, and what is wrong there; `None` where it is one.
 pub(super) fn explain<T: DeserializeOwned>(value: &Value) -> Option<(String, String)> {
-    let fault = <T as serde::Deserialize<'_>>::deserialize(Node { value, place: &Place::Top }).err()?;
+    let fault = <T as serde::Deserialize<'_>>::deserialize(PlacedValue { value, place: &ValuePlace::Top }).err()?;
     let place = fault.place.filter(|p| !p.is_empty()).unwrap_or_else(|| WHOLE.to_owned());
     Some((place, fault.message))
 }
 
 /// The way from the top to a value.
-enum Place<'a> {
+enum ValuePlace<'a> {
     Top,
-    Key(&'a Place<'a>, &'a str),
-    Index(&'a Place<'a>, usize, &'a Value),
+    Key(&'a ValuePlace<'a>, &'a str),
+    Index(&'a ValuePlace<'a>, usize, &'a Value),
 }
 
-impl fmt::Display for Place<'_> {
+impl fmt::Display for ValuePlace<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Top => Ok(()),
@@ -67,20 +67,20 @@ fn cut(text: &str, most: usize) -> String {
 
 /// What does not fit, and where.
 #[derive(Debug)]
-struct Fault {
+struct ValueFault {
     place: Option<String>,
     message: String,
 }
 
-impl fmt::Display for Fault {
+impl fmt::Display for ValueFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.message)
     }
 }
 
-impl std::error::Error for Fault {}
+impl std::error::Error for ValueFault {}
 
-impl de::Error for Fault {
+impl de::Error for ValueFault {
     fn custom<M: fmt::Display>(message: M) -> Self {
         Self { place: None, message: message.to_string() }
     }
@@ -88,37 +88,37 @@ impl de::Error for Fault {
 
 /// A value and where it stands.
 #[derive(Clone, Copy)]
-struct Node<'a, 'de> {
+struct PlacedValue<'a, 'de> {
     value: &'de Value,
-    place: &'a Place<'a>,
+    place: &'a ValuePlace<'a>,
 }
 
-impl<'de> Node<'_, 'de> {
-    fn fault(self, said: &str) -> Fault {
-        Fault { place: Some(self.place.to_string()), message: words(said, self.value) }
+impl<'de> PlacedValue<'_, 'de> {
+    fn fault(self, said: &str) -> ValueFault {
+        ValueFault { place: Some(self.place.to_string()), message: words(said, self.value) }
     }
 
     /// An error that has no place yet is this value's.
-    fn placed<T>(self, result: Result<T, Fault>) -> Result<T, Fault> {
+    fn placed<T>(self, result: Result<T, ValueFault>) -> Result<T, ValueFault> {
         result.map_err(|fault| if fault.place.is_some() { fault } else { self.fault(&fault.message) })
     }
 
-    fn list<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+    fn list<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ValueFault> {
         let Value::Array(values) = self.value else {
-            return Err(self.fault(&Fault::not_a_list(self.value, &visitor)));
+            return Err(self.fault(&ValueFault::not_a_list(self.value, &visitor)));
         };
         self.placed(visitor.visit_seq(Items { values: values.iter(), next: 0, place: self.place }))
     }
 
-    fn object<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+    fn object<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ValueFault> {
         let Value::Object(entries) = self.value else {
-            return Err(self.fault(&Fault::not_a_list(self.value, &visitor)));
+            return Err(self.fault(&ValueFault::not_a_list(self.value, &visitor)));
         };
         self.placed(visitor.visit_map(Entries { entries: entries.iter(), value: None, place: self.place }))
     }
 }
 
-impl Fault {
+impl ValueFault {
     /// serde's sentence about a value of another kind than the visitor's.
     fn not_a_list<'de, V: Visitor<'de>>(value: &Value, visitor: &V) -> String {
         let found = match value {
@@ -133,14 +133,14 @@ impl Fault {
 /// Kinds of values without parts: serde_json's own reading of a value does.
 macro_rules! plain {
     ($($method:ident)*) => {
-        $(fn $method<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+        $(fn $method<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ValueFault> {
             self.value.$method(visitor).map_err(|e| self.fault(&e.to_string()))
         })*
     };
 }
 
-impl<'de> Deserializer<'de> for Node<'_, 'de> {
-    type Error = Fault;
+impl<'de> Deserializer<'de> for PlacedValue<'_, 'de> {
+    type Error = ValueFault;
 
     plain! {
         deserialize_bool deserialize_i8 deserialize_i16 deserialize_i32 deserialize_i64 deserialize_u8 deserialize_u16
@@ -148,7 +148,7 @@ impl<'de> Deserializer<'de> for Node<'_, 'de> {
         deserialize_string deserialize_bytes deserialize_byte_buf deserialize_unit deserialize_identifier
     }
 
-    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ValueFault> {
         match self.value {
             Value::Array(_) => self.list(visitor),
             Value::Object(_) => self.object(visitor),
@@ -156,29 +156,29 @@ impl<'de> Deserializer<'de> for Node<'_, 'de> {
         }
     }
 
-    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ValueFault> {
         match self.value {
             Value::Null => visitor.visit_none(),
             _ => visitor.visit_some(self),
         }
     }
 
-    fn deserialize_unit_struct<V: Visitor<'de>>(self, name: &'static str, visitor: V) -> Result<V::Value, Fault> {
+    fn deserialize_unit_struct<V: Visitor<'de>>(self, name: &'static str, visitor: V) -> Result<V::Value, ValueFault> {
         self.value.deserialize_unit_struct(name, visitor).map_err(|e| self.fault(&e.to_string()))
     }
 
-    fn deserialize_newtype_struct<V: Visitor<'de>>(self, _: &'static str, visitor: V) -> Result<V::Value, Fault> {
+    fn deserialize_newtype_struct<V: Visitor<'de>>(self, _: &'static str, visitor: V) -> Result<V::Value, ValueFault> {
         let result = visitor.visit_newtype_struct(self);
         self.placed(result)
     }
 
-    fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+    fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ValueFault> {
         self.list(visitor)
     }
 
-    fn deserialize_tuple<V: Visitor<'de>>(self, _: usize, visitor: V) -> Result<V::Value, Fault> {
+    fn deserialize_tuple<V: Visitor<'de>>(self, _: usize, visitor: V) -> Result<V::Value, ValueFault> {
         let Value::Array(values) = self.value else { return self.list(visitor) };
-        let longer = <Fault as de::Error>::invalid_length(values.len(), &visitor).message;
+        let longer = <ValueFault as de::Error>::invalid_length(values.len(), &visitor).message;
         let mut items = Items { values: values.iter(), next: 0, place: self.place };
         let value = self.placed(visitor.visit_seq(&mut items))?;
         // Of a longer list the rest would go unread.
@@ -190,11 +190,11 @@ impl<'de> Deserializer<'de> for Node<'_, 'de> {
         _: &'static str,
         len: usize,
         visitor: V,
-    ) -> Result<V::Value, Fault> {
+    ) -> Result<V::Value, ValueFault> {
         self.deserialize_tuple(len, visitor)
     }
 
-    fn deserialize_map<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+    fn deserialize_map<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ValueFault> {
         self.object(visitor)
     }
 
@@ -203,14 +203,14 @@ impl<'de> Deserializer<'de> for Node<'_, 'de> {
         _: &'static str,
         fields: &'static [&'static str],
         visitor: V,
-    ) -> Result<V::Value, Fault> {
+    ) -> Result<V::Value, ValueFault> {
         if self.value.is_object() {
             return self.object(visitor);
         }
         // serde would take a list for the fields in their order.
         let keys: Vec<String> = fields.iter().map(|key| format!("\"{key}\"")).collect();
         let message = format!("{} is given, an object with {} is wanted", given(self.value), keys.join(", "));
-        Err(Fault { place: Some(self.place.to_string()), message })
+        Err(ValueFault { place: Some(self.place.to_string()), message })
     }
 
     fn deserialize_enum<V: Visitor<'de>>(
@@ -218,11 +218,11 @@ impl<'de> Deserializer<'de> for Node<'_, 'de> {
         name: &'static str,
         variants: &'static [&'static str],
         visitor: V,
-    ) -> Result<V::Value, Fault> {
+    ) -> Result<V::Value, ValueFault> {
         self.value.deserialize_enum(name, variants, visitor).map_err(|e| self.fault(&e.to_string()))
     }
 
-    fn deserialize_ignored_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+    fn deserialize_ignored_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ValueFault> {
         visitor.visit_unit()
     }
 }
@@ -231,17 +231,17 @@ impl<'de> Deserializer<'de> for Node<'_, 'de> {
 struct Items<'a, 'de> {
     values: std::slice::Iter<'de, Value>,
     next: usize,
-    place: &'a Place<'a>,
+    place: &'a ValuePlace<'a>,
 }
 
 impl<'de> SeqAccess<'de> for Items<'_, 'de> {
-    type Error = Fault;
+    type Error = ValueFault;
 
-    fn next_element_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<Option<S::Value>, Fault> {
+    fn next_element_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<Option<S::Value>, ValueFault> {
         let Some(value) = self.values.next() else { return Ok(None) };
-        let place = Place::Index(self.place, self.next, value);
+        let place = ValuePlace::Index(self.place, self.next, value);
         self.next += 1;
-        let node = Node { value, place: &place };
+        let node = PlacedValue { value, place: &place };
         node.placed(seed.deserialize(node)).map(Some)
     }
 
@@ -254,24 +254,24 @@ impl<'de> SeqAccess<'de> for Items<'_, 'de> {
 struct Entries<'a, 'de> {
     entries: serde_json::map::Iter<'de>,
     value: Option<(&'de str, &'de Value)>,
-    place: &'a Place<'a>,
+    place: &'a ValuePlace<'a>,
 }
 
 impl<'de> MapAccess<'de> for Entries<'_, 'de> {
-    type Error = Fault;
+    type Error = ValueFault;
 
-    fn next_key_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<Option<S::Value>, Fault> {
+    fn next_key_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<Option<S::Value>, ValueFault> {
         let Some((key, value)) = self.entries.next() else { return Ok(None) };
         self.value = Some((key.as_str(), value));
-        seed.deserialize(StrDeserializer::<Fault>::new(key.as_str())).map(Some)
+        seed.deserialize(StrDeserializer::<ValueFault>::new(key.as_str())).map(Some)
     }
 
-    fn next_value_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<S::Value, Fault> {
+    fn next_value_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<S::Value, ValueFault> {
         let Some((key, value)) = self.value.take() else {
             return Err(de::Error::custom("a value was asked for before its key"));
         };
-        let place = Place::Key(self.place, key);
-        let node = Node { value, place: &place };
+        let place = ValuePlace::Key(self.place, key);
+        let node = PlacedValue { value, place: &place };
         node.placed(seed.deserialize(node))
     }
 }
@@ -323,6 +323,8 @@ fn wanted(expected: &str) -> String {
         "u8" => "a whole number from 0 to 255".to_owned(),
         "usize" | "u64" | "u32" => "a whole number from 0 on".to_owned(),
         "a boolean" => "true or false".to_owned(),
+        // The names of our own types tell a user nothing.
+        other if other.starts_with("struct ") => "an object {...}".to_owned(),
         other => other.to_owned(),
     }
 }

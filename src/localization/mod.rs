@@ -11,6 +11,7 @@ use crate::articulation::{Action, Outcome};
 use crate::config;
 use crate::hands::{Trajectory, grip_std_m};
 use crate::math::Point;
+use crate::math::sampling::{evenly, stride};
 use crate::recording::sketch::Sketch;
 use crate::recording::{AtWork, Clip, HAND_CLASS, Recording};
 
@@ -44,9 +45,6 @@ impl Region {
     }
 }
 
-/// Surface points of a region at the most: about ten on every square centimetre of a door.
-const MAX_POINTS: usize = 60_000;
-
 /// A recording with what was looked at of it.
 #[derive(Debug, Clone, Copy)]
 pub struct Footage<'a> {
@@ -69,20 +67,19 @@ pub fn localize(
     frames: &[usize],
     config: &config::Localization,
 ) -> Outcome<Region> {
-    const NEAR_M: f64 = 0.2;
     let Footage { recording, sketches, .. } = *footage;
     let grip = trajectory.closed_grip();
     let Some(&nearest) = frames.first() else {
         return Outcome::Abstained("no frame with depth sees the grip while the furniture is closed".to_owned());
     };
     let images: Vec<&Sketch> = frames.iter().filter_map(|f| sketches.get(f)).collect();
-    let class = touched_class(recording, &images, &grip);
+    let class = touched_class(recording, &images, &grip, config);
     let mut seen = within_reach(recording, &images, 0, class, &grip, config);
     if seen.is_empty() {
         return Outcome::Abstained("no depth within reach of the hand in the local frames".to_owned());
     }
     // A person at a door sees half of it: frames of the whole recording in which nobody is at work show the rest.
-    let others = if config.closed_state_frames { others(footage, clip, frames, &grip) } else { Vec::new() };
+    let others = if config.closed_state_frames { others(footage, clip, frames, &grip, config) } else { Vec::new() };
     if !others.is_empty() {
         seen.extend(within_reach(recording, &others, images.len(), class, &grip, config));
     }
@@ -90,14 +87,13 @@ pub fn localize(
     // A grip stands off its face by a handle, and hands are estimated to a few centimetres. One that was first seen on the way
     // is as far from where it took hold as it is uncertain; frames of the interaction itself show the part where the hand is.
     let held = trajectory.closed_end_seen() || !config.closed_state_frames;
-    let near_m = if held { NEAR_M } else { NEAR_M + 2.0 * grip_std_m(false) };
+    let near_m = if held { config.near_m } else { config.near_m + 2.0 * grip_std_m(false) };
     // Fewer views than asked for where nothing reaches them: a coarse region is better than none, and it says so.
     for min_views in (1..=config.min_views).rev() {
         let confident: Vec<[i32; 3]> =
             counts.iter().filter(|(_, n)| *n as usize >= min_views).map(|(v, _)| *v).collect();
         let connected = voxels::connected_with(&confident, &grip, config.voxel_m, near_m);
-        // A face of 30 x 30 cm fills 36 voxels of 5 cm; a third of that is no furniture.
-        if connected.len() >= 12 {
+        if connected.len() >= config.least_voxels {
             return Outcome::Found(Region {
                 voxel_m: config.voxel_m,
                 voxels: connected,
@@ -130,7 +126,7 @@ fn within_reach(
     views.iter().enumerate().flat_map(of_view).collect()
 }
 
-/// Points inside a region's voxels, of the views that it was found in: world, metres; at most [`MAX_POINTS`].
+/// Points inside a region's voxels, of the views that it was found in: world, metres; at most `most_points`.
 #[must_use]
 pub fn inside(footage: &Footage, region: &Region, config: &config::Localization) -> Vec<Point> {
     let Footage { located, sketches, .. } = *footage;
@@ -142,20 +138,26 @@ pub fn inside(footage: &Footage, region: &Region, config: &config::Localization)
         .map(|(_, p)| p)
         .filter(|p| voxels.contains(&voxels::index(p, region.voxel_m)))
         .collect();
-    points.iter().copied().step_by(points.len().div_ceil(MAX_POINTS).max(1)).collect()
+    points.iter().copied().step_by(stride(points.len(), config.most_points)).collect()
 }
 
-/// Frames of the whole recording that see the grip while nobody is at work, other than the local ones: at most forty, spread
+/// Frames of the whole recording that see the grip while nobody is at work, other than the local ones: `other_frames` at most, spread
 /// over the recording.
-fn others<'a>(footage: &Footage<'a>, clip: &Clip, local: &[usize], grip: &Point) -> Vec<&'a Sketch> {
-    const COUNT: usize = 40;
+fn others<'a>(
+    footage: &Footage<'a>,
+    clip: &Clip,
+    local: &[usize],
+    grip: &Point,
+    config: &config::Localization,
+) -> Vec<&'a Sketch> {
     let at_work = |f: usize| (clip.start_frame..=clip.end_frame).contains(&f) || footage.at_work.any(f);
     let all: Vec<&Sketch> = footage
         .sketches
         .values()
-        .filter(|s| !at_work(s.frame) && !local.contains(&s.frame) && sees(footage.recording, s.frame, grip))
+        .filter(|s| !at_work(s.frame) && !local.contains(&s.frame) && sees(footage.recording, s.frame, grip, config))
         .collect();
-    (0..all.len().min(COUNT)).map(|i| all[i * all.len() / all.len().min(COUNT)]).collect()
+    let count = all.len().min(config.other_frames);
+    (0..count).map(|i| all[i * all.len() / count]).collect()
 }
 
 /// World points of a frame's depth, hands and (where there are masks) other classes left out.
@@ -163,13 +165,14 @@ fn others<'a>(footage: &Footage<'a>, clip: &Clip, local: &[usize], grip: &Point)
 pub fn points(recording: &Recording, sketch: &Sketch, class: Option<u8>) -> Vec<Point> {
     let pose = &recording.frames[sketch.frame].world_from_camera;
     let factor = recording.depth_factor(sketch.frame);
+    let camera = recording.camera_of(sketch.frame);
     let width = sketch.depth_mm.width;
     let mut out = Vec::new();
     for i in 0..sketch.depth_mm.data.len() {
         if sketch.class.as_ref().zip(class).is_some_and(|(of, c)| of.data[i] != c) {
             continue;
         }
-        if let Some(p) = sketch.point(&recording.camera, i % width, i / width) {
+        if let Some(p) = sketch.point(camera, i % width, i / width) {
             out.push(pose * Point::from(p.coords * factor));
         }
     }
@@ -187,11 +190,13 @@ pub fn local_frames(
 ) -> Vec<usize> {
     let grip = &trajectory.closed_grip();
     let [first, last] = trajectory.contact_frames();
-    let usable = |frame: &usize| recording.has_depth(*frame) && sees(recording, *frame, grip);
+    let usable = |frame: &usize| recording.has_depth(*frame) && sees(recording, *frame, grip, config);
     if !config.closed_state_frames {
         let active: Vec<usize> = (first..=last).filter(usable).collect();
-        return spread(&active, config.local_frames);
+        return evenly(&active, config.local_frames);
     }
+    // What another video shows was another time.
+    let video = recording.video_frames(clip.start_frame);
     // Twice as many neighbours as needed, thinned evenly: viewpoints differ and one bad frame does not decide.
     let want = 2 * config.local_frames;
     // A hand that was not seen to take hold may have moved the part before it was seen: the narration tells where.
@@ -201,14 +206,15 @@ pub fn local_frames(
     ];
     let mut chosen: Vec<usize> = match trajectory.action {
         // The first moment of contact has not moved the part yet.
-        Action::Open => {
-            (0..=begin.min(last)).rev().filter(|f| !at_work.other(*f, clip)).filter(usable).take(want).collect()
-        }
-        Action::Close => (end.max(first)..recording.frames.len())
-            .take_while(|f| !at_work.other(*f, clip))
+        Action::Open => (video.start..=begin.min(last))
+            .rev()
+            .filter(|f| !at_work.other(*f, clip))
             .filter(usable)
             .take(want)
             .collect(),
+        Action::Close => {
+            (end.max(first)..video.end).take_while(|f| !at_work.other(*f, clip)).filter(usable).take(want).collect()
+        }
     };
     if chosen.len() < config.min_views {
         // The gaze left early: a recording starts with its furniture closed.
@@ -216,34 +222,26 @@ pub fn local_frames(
             recording.clips.iter().filter(|c| c.end_frame > c.start_frame).map(|c| c.start_frame).min().unwrap_or(0);
         chosen.extend((0..start).rev().filter(usable).take(want - chosen.len()));
     }
-    spread(&chosen, config.local_frames)
-}
-
-/// Evenly spaced members of a list, its first member always among them.
-fn spread(list: &[usize], count: usize) -> Vec<usize> {
-    if list.len() <= count {
-        return list.to_vec();
-    }
-    (0..count).map(|i| list[i * (list.len() - 1) / count.saturating_sub(1).max(1)]).collect()
+    evenly(&chosen, config.local_frames)
 }
 
 /// Whether a point is in front of a frame's camera, on its image and near enough for its depth to mean something.
-fn sees(recording: &Recording, frame: usize, p: &Point) -> bool {
+fn sees(recording: &Recording, frame: usize, p: &Point, config: &config::Localization) -> bool {
     let local = recording.frames[frame].world_from_camera.inverse() * p;
-    // Beyond three metres a metre-scale depth estimate is worth less than a voxel.
-    local.z < 3.0 && recording.camera.project(&local).is_some_and(|(u, v)| recording.camera.contains(u, v))
+    let camera = recording.camera_of(frame);
+    local.z < config.seen_m[1] && camera.project(&local).is_some_and(|(u, v)| camera.contains(u, v))
 }
 
 /// The class that most pixels around the grip show, at the grip's depth, in frames that see it.
-fn touched_class(recording: &Recording, images: &[&Sketch], grip: &Point) -> Option<u8> {
-    // A fist's size around the grip, and the depth of a handle with its face behind it.
-    const RADIUS_M: f64 = 0.06;
-    const DEPTH_M: f64 = 0.12;
+fn touched_class(recording: &Recording, images: &[&Sketch], grip: &Point, config: &config::Localization) -> Option<u8> {
+    let [radius_m, depth_m] = config.grip_m;
+    let [least_px, most_px] = config.grip_px;
     let mut votes: BTreeMap<u8, usize> = BTreeMap::new();
     for (sketch, classes) in images.iter().filter_map(|s| Some((s, s.class.as_ref()?))) {
         let local = recording.frames[sketch.frame].world_from_camera.inverse() * grip;
-        let Some((u, v)) = recording.camera.project(&local) else { continue };
-        let radius = (RADIUS_M / local.z * recording.camera.fx).clamp(3.0, 160.0);
+        let camera = recording.camera_of(sketch.frame);
+        let Some((u, v)) = camera.project(&local) else { continue };
+        let radius = (radius_m / local.z * camera.fx).clamp(least_px, most_px);
         let factor = recording.depth_factor(sketch.frame);
         let step = sketch.step as f64;
         let reach = (radius / step).ceil() as i64;
@@ -252,23 +250,11 @@ fn touched_class(recording: &Recording, images: &[&Sketch], grip: &Point) -> Opt
                 let Some((x, y)) = sketch.sample(u + dx as f64 * step, v + dy as f64 * step) else { continue };
                 let i = y * sketch.depth_mm.width + x;
                 let (class, z) = (classes.data[i], f64::from(sketch.depth_m(i)) * factor);
-                if class != 0 && class != HAND_CLASS && z > 0.0 && (z - local.z).abs() < DEPTH_M {
+                if class != 0 && class != HAND_CLASS && z > 0.0 && (z - local.z).abs() < depth_m {
                     *votes.entry(class).or_default() += 1;
                 }
             }
         }
     }
     votes.into_iter().max_by_key(|(class, n)| (*n, std::cmp::Reverse(*class))).map(|(class, _)| class)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn spreading_keeps_the_nearest_frame() {
-        assert_eq!(spread(&[9, 8, 7, 6, 5, 4, 3, 2, 1], 3), [9, 5, 1]);
-        assert_eq!(spread(&[4, 3], 5), [4, 3]);
-        assert_eq!(spread(&[], 5), [0usize; 0]);
-    }
 }

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use rayon::prelude::*;
 
 use crate::config;
+use crate::math::sampling::{farthest, stride};
 use crate::math::{Point, centroid};
 use crate::recording::sketch::Sketch;
 use crate::recording::{AtWork, Recording};
@@ -17,20 +18,21 @@ pub struct Occupancy {
     low: [i32; 3],
     size: [usize; 3],
     full: Vec<bool>,
+    /// Edge of a cell, metres.
+    cell_m: f64,
+    /// What is this near to either end of a sight does not hide it, metres.
+    clear_m: f64,
 }
 
 impl Occupancy {
-    /// Edge of a cell: what hides a front is larger, a handle and the noise of depth are smaller.
-    const CELL_M: f64 = 0.1;
-    /// More cells than a house of 20 x 20 x 4 m has: a scene with a stray point far away is not gridded whole.
-    const MAX_CELLS: usize = 8_000_000;
-    /// Views that must agree on a surface; one may show somebody's arm.
-    const VIEWS: u32 = 3;
-
     /// From the depth of all frames that were looked at.
     #[must_use]
-    pub fn of(recording: &Recording, sketches: &BTreeMap<usize, Sketch>) -> Self {
-        let cells = |p: &Point| voxels::index(p, Self::CELL_M);
+    pub fn of(recording: &Recording, sketches: &BTreeMap<usize, Sketch>, config: &config::Localization) -> Self {
+        /// Numerics: more cells than a house of 20 x 20 x 4 m has: a scene with a stray point far away is not gridded whole.
+        const MAX_CELLS: usize = 8_000_000;
+        let rules = &config.occupied;
+        let (cell_m, clear_m) = (rules.cell_m, rules.clear_m);
+        let cells = |p: &Point| voxels::index(p, cell_m);
         let sketches: Vec<&Sketch> = sketches.values().collect();
         // Views that see each cell.
         let mut seen: HashMap<[i32; 3], u32> = HashMap::new();
@@ -39,7 +41,7 @@ impl Occupancy {
                 .par_iter()
                 .map(|sketch| {
                     let mut seen: Vec<[i32; 3]> =
-                        super::points(recording, sketch, None).iter().step_by(3).map(cells).collect();
+                        super::points(recording, sketch, None).iter().step_by(rules.every).map(cells).collect();
                     seen.sort_unstable();
                     seen.dedup();
                     seen
@@ -67,14 +69,14 @@ impl Occupancy {
             let (low, high) = (at_rank(position.floor() as u64), at_rank(position.ceil() as u64));
             (low + (high - low) * (position - position.floor())) as i32
         };
-        let low = [0, 1, 2].map(|k| bound(k, 0.002));
-        let size = [0, 1, 2].map(|k| (bound(k, 0.998) - low[k] + 1).max(1) as usize);
-        if size.iter().product::<usize>() > Self::MAX_CELLS {
-            return Self { low, size: [0; 3], full: Vec::new() };
+        let low = [0, 1, 2].map(|k| bound(k, rules.rim_share));
+        let size = [0, 1, 2].map(|k| (bound(k, 1.0 - rules.rim_share) - low[k] + 1).max(1) as usize);
+        if size.iter().product::<usize>() > MAX_CELLS {
+            return Self { low, size: [0; 3], full: Vec::new(), cell_m, clear_m };
         }
-        let mut grid = Self { low, size, full: Vec::new() };
+        let mut grid = Self { low, size, full: Vec::new(), cell_m, clear_m };
         let mut full = vec![false; size.iter().product()];
-        for (cell, _) in seen.iter().filter(|(_, views)| **views >= Self::VIEWS) {
+        for (cell, _) in seen.iter().filter(|(_, views)| **views as usize >= rules.views) {
             if let Some(i) = grid.index(cell) {
                 full[i] = true;
             }
@@ -93,28 +95,28 @@ impl Occupancy {
     /// Whether something stands between two points, apart from what is around either.
     #[must_use]
     pub fn hides(&self, eye: &Point, target: &Point) -> bool {
-        /// The target's own surroundings, and the person's hands and hair.
-        const CLEAR_M: f64 = 0.25;
         let way = target - eye;
         let length = way.norm();
-        let steps = ((length - 2.0 * CLEAR_M) / (0.7 * Self::CELL_M)).floor().max(0.0) as usize;
+        // Arithmetic: in such steps no cell is missed but at its corners.
+        let step = 0.7 * self.cell_m;
+        let steps = ((length - 2.0 * self.clear_m) / step).floor().max(0.0) as usize;
         (0..steps).any(|i| {
-            let p = eye + way * ((CLEAR_M + 0.7 * Self::CELL_M * i as f64) / length);
-            self.index(&voxels::index(&p, Self::CELL_M)).is_some_and(|i| self.full[i])
+            let p = eye + way * ((self.clear_m + step * i as f64) / length);
+            self.index(&voxels::index(&p, self.cell_m)).is_some_and(|i| self.full[i])
         })
     }
 }
 
-/// Frames with an image in which nobody is at work: where global views are looked for. In a long recording every n-th of them:
-/// the same places are seen again and again.
+/// Frames with an image in which nobody is at work: where global views are looked for. Where some frames have depth, of these
+/// alone, as the others show no place of anything. In a long recording every n-th of them: the same places are seen again and
+/// again.
 #[must_use]
-pub fn idle(recording: &Recording, at_work: &AtWork) -> Vec<usize> {
-    /// Ten minutes at 7 frames a second. So many are asked of every clip.
-    const MOST: usize = 4000;
-    let all: Vec<usize> =
-        (0..recording.frames.len()).filter(|&f| recording.frames[f].files.rgb.is_some() && !at_work.any(f)).collect();
-    let stride = all.len().div_ceil(MOST).max(1);
-    all.into_iter().step_by(stride).collect()
+pub fn idle(recording: &Recording, at_work: &AtWork, config: &config::Localization) -> Vec<usize> {
+    let deep = (0..recording.frames.len()).any(|f| recording.has_depth(f));
+    let usable = |f: &usize| recording.frames[*f].files.rgb.is_some() && (!deep || recording.has_depth(*f));
+    let all: Vec<usize> = (0..recording.frames.len()).filter(|f| usable(f) && !at_work.any(*f)).collect();
+    let every = stride(all.len(), config.idle_frames);
+    all.into_iter().step_by(every).collect()
 }
 
 /// Selects up to `global_views` of the `idle` frames that see the region, spread over camera positions.
@@ -129,15 +131,13 @@ pub fn reselect(
     occupancy: Option<&Occupancy>,
     config: &config::Localization,
 ) -> Vec<usize> {
-    /// A sample of the region's voxels tells the share that is seen to a few per cent.
-    const PROBES: usize = 60;
     let centers = region.centers();
     let Some(middle) = centroid(&centers) else { return Vec::new() };
-    let probes: Vec<Point> = centers.iter().copied().step_by(centers.len().div_ceil(PROBES)).collect();
+    let probes: Vec<Point> = centers.iter().copied().step_by(stride(centers.len(), config.probes)).collect();
     let mut candidates: Vec<usize> = idle
         .par_iter()
         .copied()
-        .filter(|&f| visible_share(recording, f, &probes, occupancy, config.min_visible_share))
+        .filter(|&f| visible_share(recording, f, &probes, occupancy, (config.min_visible_share, config.seen_m)))
         .collect();
     // The local frames show the closed state from near by, whatever the clips' bounds say.
     candidates.extend(region.local_frames.iter().filter(|f| recording.frames[**f].files.rgb.is_some()));
@@ -147,6 +147,25 @@ pub fn reselect(
     let start =
         (0..candidates.len()).min_by(|&a, &b| distance(candidates[a]).total_cmp(&distance(candidates[b]))).unwrap_or(0);
     spread(recording, &candidates, start, config.global_views)
+}
+
+/// Up to `count` of the `idle` frames that have a place within three metres before them, spread over camera positions; the one
+/// nearest to it is among them.
+#[must_use]
+pub fn sighting(
+    recording: &Recording,
+    idle: &[usize],
+    place: &Point,
+    count: usize,
+    config: &config::Localization,
+) -> Vec<usize> {
+    let place_only = std::slice::from_ref(place);
+    let candidates: Vec<usize> =
+        idle.iter().copied().filter(|&f| visible_share(recording, f, place_only, None, (1.0, config.seen_m))).collect();
+    let distance = |f: usize| (recording.frames[f].center() - place).norm();
+    let start =
+        (0..candidates.len()).min_by(|&a, &b| distance(candidates[a]).total_cmp(&distance(candidates[b]))).unwrap_or(0);
+    spread(recording, &candidates, start, count)
 }
 
 /// Up to `count` frames outside the interactions, spread over camera positions: what the room looks like when nothing moves.
@@ -159,43 +178,28 @@ pub fn survey(recording: &Recording, at_work: &AtWork, count: usize) -> Vec<usiz
 
 /// Farthest-point sampling over camera positions from `candidates[start]` on; ascending.
 fn spread(recording: &Recording, candidates: &[usize], start: usize, count: usize) -> Vec<usize> {
-    let position = |f: usize| recording.frames[f].center();
-    let mut distance: Vec<f64> = vec![f64::INFINITY; candidates.len()];
-    let mut chosen = Vec::new();
-    let mut next = (start < candidates.len()).then_some(start);
-    while let Some(i) = next {
-        chosen.push(candidates[i]);
-        if chosen.len() >= count.min(candidates.len()) {
-            break;
-        }
-        let from = position(candidates[i]);
-        distance[i] = f64::NEG_INFINITY;
-        for (d, &f) in distance.iter_mut().zip(candidates) {
-            *d = d.min((position(f) - from).norm());
-        }
-        next = (0..candidates.len())
-            .filter(|&j| distance[j] > f64::NEG_INFINITY)
-            .max_by(|&a, &b| distance[a].total_cmp(&distance[b]).then(b.cmp(&a)));
-    }
-    chosen.sort_unstable();
-    chosen
+    let places: Vec<Point> = candidates.iter().map(|&f| recording.frames[f].center()).collect();
+    let chosen = farthest(places.len(), start, count.max(1), |a, b| (places[b] - places[a]).norm());
+    let mut frames: Vec<usize> = chosen.into_iter().map(|i| candidates[i]).collect();
+    frames.sort_unstable();
+    frames
 }
 
-/// Whether at least a share of the points is inside a frame's frustum, between 0.2 and 3 m from the camera, and not hidden.
+/// Whether at least a share of the points is inside a frame's frustum, between two distances from the camera, and not hidden.
 fn visible_share(
     recording: &Recording,
     frame: usize,
     points: &[Point],
     occupancy: Option<&Occupancy>,
-    share: f64,
+    (share, [nearest_m, farthest_m]): (f64, [f64; 2]),
 ) -> bool {
     let camera_from_world = recording.frames[frame].world_from_camera.inverse();
     let eye = recording.frames[frame].center();
+    let camera = recording.camera_of(frame);
     let needed = (share * points.len() as f64).ceil() as usize;
     let inside = |p: &&Point| {
         let local = camera_from_world * **p;
-        (0.2..3.0).contains(&local.z)
-            && recording.camera.project(&local).is_some_and(|(u, v)| recording.camera.contains(u, v))
+        (nearest_m..farthest_m).contains(&local.z) && camera.project(&local).is_some_and(|(u, v)| camera.contains(u, v))
     };
     // The cheap test first: most frames of a long recording look elsewhere.
     let in_frustum: Vec<&Point> = points.iter().filter(inside).collect();
@@ -210,7 +214,7 @@ mod tests {
     #[test]
     fn a_wall_hides_what_is_behind_it_and_not_what_is_before_or_on_it() {
         let mut full = vec![false; 40 * 40 * 40];
-        let mut grid = Occupancy { low: [0; 3], size: [40; 3], full: Vec::new() };
+        let mut grid = Occupancy { low: [0; 3], size: [40; 3], full: Vec::new(), cell_m: 0.1, clear_m: 0.25 };
         for y in 0..40 {
             for z in 0..40 {
                 full[grid.index(&[20, y, z]).unwrap()] = true;

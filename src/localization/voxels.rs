@@ -37,8 +37,9 @@ pub fn count_views(seen: &[(u32, Point)], voxel_m: f64) -> Vec<([i32; 3], u32)> 
     counts
 }
 
-/// Bits of a voxel's index along one axis, and its offset: 50 km to each side at 5 cm.
+/// Format: bits of a voxel's index along one axis: 50 km to each side at 5 cm.
 const BITS: u32 = 21;
+/// Format: index of the origin.
 const OFFSET: i64 = 1 << (BITS - 1);
 
 fn pack(p: &Point, scale: f64) -> u64 {
@@ -65,6 +66,7 @@ struct Table {
 }
 
 impl Table {
+    /// Format: no voxel.
     const EMPTY: u64 = u64::MAX;
 
     fn new() -> Self {
@@ -105,6 +107,25 @@ impl Table {
     }
 }
 
+/// Takes out of a set the voxels that hang together with a seed over faces, edges or corners (26 neighbours); the seed comes
+/// first, be it in the set or not.
+#[must_use]
+pub fn take_piece(left: &mut HashSet<[i32; 3]>, seed: [i32; 3]) -> Vec<[i32; 3]> {
+    left.remove(&seed);
+    let mut piece = vec![seed];
+    let mut next = 0;
+    while let Some(&[x, y, z]) = piece.get(next) {
+        next += 1;
+        for i in 0..27 {
+            let neighbour = [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1];
+            if left.remove(&neighbour) {
+                piece.push(neighbour);
+            }
+        }
+    }
+    piece
+}
+
 /// The voxels of the connected piece (26 neighbours) nearest to the grip, sorted; empty where none is within `near_m` of it.
 #[must_use]
 pub fn connected_with(voxels: &[[i32; 3]], grip: &Point, voxel_m: f64, near_m: f64) -> Vec<[i32; 3]> {
@@ -116,22 +137,7 @@ pub fn connected_with(voxels: &[[i32; 3]], grip: &Point, voxel_m: f64, near_m: f
         near.into_iter().map(|(_, v)| v).collect()
     };
     let Some(&seed) = seeds.first() else { return Vec::new() };
-    left.remove(&seed);
-    let mut piece = vec![seed];
-    let mut next = 0;
-    while let Some(&[x, y, z]) = piece.get(next) {
-        next += 1;
-        for dx in -1..=1 {
-            for dy in -1..=1 {
-                for dz in -1..=1 {
-                    let neighbour = [x + dx, y + dy, z + dz];
-                    if left.remove(&neighbour) {
-                        piece.push(neighbour);
-                    }
-                }
-            }
-        }
-    }
+    let mut piece = take_piece(&mut left, seed);
     piece.sort_unstable();
     piece
 }

@@ -4,7 +4,7 @@ use super::{Vector, unit};
 
 /// A cluster of unit vectors.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Cluster {
+pub struct DirectionCluster {
     /// Unit mean direction.
     pub center: Vector,
     /// Members.
@@ -15,7 +15,7 @@ pub struct Cluster {
 ///
 /// The start is the farthest-point rule from the first vector, so that the result does not depend on chance.
 #[must_use]
-pub fn kmeans(normals: &[Vector], k: usize, rounds: usize) -> Vec<Cluster> {
+pub fn kmeans(normals: &[Vector], k: usize, rounds: usize) -> Vec<DirectionCluster> {
     let Some(first) = normals.first() else { return Vec::new() };
     let mut centers = vec![*first];
     let mut nearest: Vec<f64> = normals.iter().map(|n| n.dot(first)).collect();
@@ -53,15 +53,15 @@ pub fn kmeans(normals: &[Vector], k: usize, rounds: usize) -> Vec<Cluster> {
             break;
         }
     }
-    let mut clusters: Vec<Cluster> =
-        centers.into_iter().zip(counts).map(|(center, count)| Cluster { center, count }).collect();
+    let mut clusters: Vec<DirectionCluster> =
+        centers.into_iter().zip(counts).map(|(center, count)| DirectionCluster { center, count }).collect();
     clusters.sort_by_key(|c| std::cmp::Reverse(c.count));
     clusters
 }
 
 /// A mode of a set of axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Mode {
+pub struct DensityMode {
     /// Unit direction; its sign carries no meaning.
     pub axis: Vector,
     /// Sum of the weights within the bandwidth.
@@ -70,7 +70,7 @@ pub struct Mode {
 
 /// Mean shift of weighted axes (directions without sign) with a flat kernel of `bandwidth` radians, heaviest mode first.
 #[must_use]
-pub fn mean_shift(axes: &[(Vector, f64)], bandwidth: f64) -> Vec<Mode> {
+pub fn mean_shift(axes: &[(Vector, f64)], bandwidth: f64) -> Vec<DensityMode> {
     let cosine = bandwidth.cos();
     let climb = |start: &Vector| {
         let mut at = *start;
@@ -92,9 +92,9 @@ pub fn mean_shift(axes: &[(Vector, f64)], bandwidth: f64) -> Vec<Mode> {
                 break;
             }
         }
-        Mode { axis: at, weight }
+        DensityMode { axis: at, weight }
     };
-    let mut modes: Vec<Mode> = Vec::new();
+    let mut modes: Vec<DensityMode> = Vec::new();
     for (axis, _) in axes {
         let mode = climb(axis);
         if !modes.iter().any(|m| m.axis.dot(&mode.axis).abs() >= cosine) {

@@ -81,6 +81,49 @@ pub fn smooth(times: &[f64], observations: &[Point], filter: &Filter) -> Smoothe
     Smoothed { positions: steps.map(point).collect(), accepted }
 }
 
+/// What the motion model expects of a step before its observation is seen.
+struct Expected {
+    position: f64x4,
+    velocity: f64x4,
+    covariance: Symmetric,
+    f: f64,
+    e: f64,
+}
+
+impl Expected {
+    /// After a step, by the transition to the next one.
+    fn after(step: &Step, transition: Transition) -> Self {
+        let Step { position, velocity, covariance: before, .. } = *step;
+        let Transition { f, e, q11, q12, q22 } = transition;
+        let moved = before.c + f * before.v;
+        let covariance =
+            Symmetric { p: before.p + f * (before.c + moved) + q11, c: e * moved + q12, v: e * e * before.v + q22 };
+        Self { position: position + velocity * f, velocity: velocity * e, covariance, f, e }
+    }
+
+    /// The step itself: `innovation` is the observation less the expected position, `r` its variance, m^2. An observation that
+    /// is not believed changes nothing.
+    fn step(&self, innovation: f64x4, r: f64, believed: bool) -> Step {
+        let predicted = self.covariance;
+        let s = predicted.p + r;
+        // Weight of the innovation a variance, and what is left of the variance.
+        let (share, left, innovation) = if believed { (1.0 / s, r / s, innovation) } else { (0.0, 1.0, f64x4::ZERO) };
+        Step {
+            position: self.position + innovation * (predicted.p * share),
+            velocity: self.velocity + innovation * (predicted.c * share),
+            covariance: Symmetric {
+                p: predicted.p * left,
+                c: predicted.c * left,
+                v: predicted.v - predicted.c * predicted.c * share,
+            },
+            predicted,
+            kept: 1.0,
+            f: self.f,
+            e: self.e,
+        }
+    }
+}
+
 /// Filters forward, into `steps` and `accepted`; of a start that is contradicted, how many samples it has.
 fn forward(
     times: &[f64],
@@ -105,18 +148,14 @@ fn forward(
     steps.clear();
     for (t, z) in observations.iter().enumerate() {
         let z = f64x4::from([z.x, z.y, z.z, 0.0]);
-        let Some(&Step { position, velocity, covariance: before, .. }) = steps.last() else {
+        let Some(last) = steps.last() else {
             steps.push(start(z));
             accepted[t] = true;
             continue;
         };
-        let Transition { f, e, q11, q12, q22 } = filter.motion.discretise((times[t] - times[t - 1]).max(0.0));
-        let moved = before.c + f * before.v;
-        let predicted =
-            Symmetric { p: before.p + f * (before.c + moved) + q11, c: e * moved + q12, v: e * e * before.v + q22 };
-        let (position, velocity) = (position + velocity * f, velocity * e);
-        let innovation = z - position;
-        let s = predicted.p + r;
+        let expected = Expected::after(last, filter.motion.discretise((times[t] - times[t - 1]).max(0.0)));
+        let innovation = z - expected.position;
+        let s = expected.covariance.p + r;
         let (off, gate) = ((innovation * innovation).reduce_add(), filter.gate * s);
         if off > gate && filter.restart_after > 0 && rejected_in_a_row >= filter.restart_after {
             // As many samples as it takes to restart are needed to be believed against them.
@@ -133,21 +172,7 @@ fn forward(
         let believed = off <= gate;
         accepted[t] = believed;
         rejected_in_a_row = if believed { 0 } else { rejected_in_a_row + 1 };
-        // Weight of the innovation a variance, and what is left of the variance.
-        let (share, left, innovation) = if believed { (1.0 / s, r / s, innovation) } else { (0.0, 1.0, f64x4::ZERO) };
-        steps.push(Step {
-            position: position + innovation * (predicted.p * share),
-            velocity: velocity + innovation * (predicted.c * share),
-            covariance: Symmetric {
-                p: predicted.p * left,
-                c: predicted.c * left,
-                v: predicted.v - predicted.c * predicted.c * share,
-            },
-            predicted,
-            kept: 1.0,
-            f,
-            e,
-        });
+        steps.push(expected.step(innovation, r, believed));
     }
     None
 }

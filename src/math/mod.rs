@@ -8,6 +8,7 @@ pub mod ou;
 pub mod path;
 pub mod plane;
 pub mod ransac;
+pub mod sampling;
 pub mod stats;
 
 use nalgebra::{Matrix3, Point3, SymmetricEigen, Unit, UnitQuaternion, Vector3};
@@ -51,6 +52,31 @@ pub fn eigen_descending(matrix: Matrix3<f64>) -> (Matrix3<f64>, Vector) {
     (Matrix3::from_columns(&columns), Vector::from_iterator(order.iter().map(|&i| eigen.eigenvalues[i])))
 }
 
+/// A number for people, with all its digits: large and small ones with their power of ten.
+#[must_use]
+pub fn plain(value: f64) -> String {
+    let size = value.abs();
+    if size == 0.0 || (1e-6..1e7).contains(&size) { value.to_string() } else { format!("{value:e}") }
+}
+
+/// The length of a vector, also of one whose square no number holds.
+#[must_use]
+pub fn length(vector: &Vector) -> f64 {
+    let most = vector.amax();
+    if most > 0.0 && most.is_finite() { (vector / most).norm() * most } else { vector.norm() }
+}
+
+/// A number for people with some digits behind its point; from ten million on with its power of ten.
+#[must_use]
+pub fn rounded(value: f64, digits: usize) -> String {
+    const LONG: f64 = 1e7;
+    if value.abs() < LONG || !value.is_finite() {
+        return format!("{value:.digits$}");
+    }
+    let short: f64 = format!("{value:.2e}").parse().unwrap_or(value);
+    format!("{short:e}")
+}
+
 /// Any unit vector orthogonal to `direction`.
 #[must_use]
 pub fn any_orthogonal(direction: &Vector) -> Vector {
@@ -86,6 +112,15 @@ pub fn rotation(axis: &Vector, angle: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_axis_angle(&Unit::new_normalize(*axis), angle)
 }
 
+/// Distance of a point from the segment between two others in a plane; beyond the ends it is that of the end.
+#[must_use]
+pub fn segment_distance(p: [f64; 2], from: [f64; 2], to: [f64; 2]) -> f64 {
+    let d = [to[0] - from[0], to[1] - from[1]];
+    let length2 = (d[0] * d[0] + d[1] * d[1]).max(1e-12);
+    let t = (((p[0] - from[0]) * d[0] + (p[1] - from[1]) * d[1]) / length2).clamp(0.0, 1.0);
+    (p[0] - from[0] - t * d[0]).hypot(p[1] - from[1] - t * d[1])
+}
+
 /// Unit vector, or `None` where the input is too short or not finite.
 #[must_use]
 pub fn unit(vector: &Vector) -> Option<Vector> {
@@ -104,6 +139,13 @@ mod tests {
         let (axes, variances) = principal_directions(&points).unwrap();
         assert!(unsigned_angle(&axes.column(0).into_owned(), &d) < 1e-7);
         assert!(variances[1].abs() < 1e-12);
+    }
+
+    #[test]
+    fn beyond_its_ends_a_segment_is_as_far_as_its_end() {
+        let distance = |p| segment_distance(p, [0.0, 0.0], [2.0, 0.0]);
+        assert_eq!([distance([1.0, 3.0]), distance([5.0, 4.0]), distance([-3.0, -4.0])], [3.0, 5.0, 5.0]);
+        assert_eq!(segment_distance([3.0, 4.0], [0.0; 2], [0.0; 2]), 5.0);
     }
 
     #[test]

@@ -1,5 +1,8 @@
 //! Order statistics and small helpers. NaN sorts last; an empty slice gives `None`.
 
+/// Standard deviation of a normal variable over the median of its absolute value.
+pub const NORMAL_PER_MEDIAN: f64 = 1.4826;
+
 /// The `q`-quantile (0..=1) with linear interpolation.
 #[must_use]
 pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
@@ -38,6 +41,22 @@ pub fn weighted_median(values: &[(f64, f64)]) -> Option<f64> {
         }
     }
     None
+}
+
+/// The members of a sorted list within the window that holds most of them, the first of equals; `None` for an empty one.
+#[must_use]
+pub fn densest(sorted: &[f64], window: f64) -> Option<std::ops::Range<usize>> {
+    let mut best: Option<std::ops::Range<usize>> = None;
+    let mut start = 0;
+    for (end, &last) in sorted.iter().enumerate() {
+        while last - sorted[start] > window {
+            start += 1;
+        }
+        if best.as_ref().is_none_or(|b| end + 1 - start > b.len()) {
+            best = Some(start..end + 1);
+        }
+    }
+    best
 }
 
 /// Mean; `None` for an empty slice.
@@ -86,6 +105,12 @@ mod tests {
         assert_eq!(log_sum(&[-2000.0, NOTHING]), -2000.0);
         assert!((log_sum(&[1000.0, 1000.0]) - 1000.0 - 2.0f64.ln()).abs() < 1e-12);
         assert!(log_sum(&[1.0, f64::NAN]).is_nan() && log_sum(&[f64::NAN]).is_nan());
+    }
+
+    #[test]
+    fn the_densest_window_is_the_first_that_holds_most() {
+        assert_eq!(densest(&[0.0, 1.0, 1.1, 1.2, 5.0, 5.1, 5.2], 0.3), Some(1..4));
+        assert_eq!((densest(&[], 1.0), densest(&[7.0], 1.0)), (None, Some(0..1)));
     }
 
     #[test]

@@ -7,21 +7,24 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
-use super::glb::Scene;
-use super::limits::limits;
+use super::findings::Findings;
+use super::glb::GltfScene;
+use super::joint_limits::limits;
+use super::links::{JointType, Model, ModelFormat, Shape, WORLD};
 use super::masses::masses;
-use super::parts::parts;
+use super::part_sizes::parts;
 use super::places::{animations, places, same_places};
 use super::rigid_bodies;
 use super::sweep::sweep;
-use super::{Format, Kind, Model, Shape, Tree, traps};
+use super::traps;
+use super::tree::Tree;
 use crate::math;
 use crate::twin::Twin;
 
-/// What a file says to a point.
+/// What a file says to a point of the definition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Verdict {
+pub enum PointVerdict {
     /// It holds.
     Pass,
     /// It does not.
@@ -33,15 +36,15 @@ pub enum Verdict {
     NotJudged,
 }
 
-/// A point and what a file says to it.
+/// A point of the definition, and what a file says to it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Point {
+pub struct CheckedPoint {
     /// Its number in the definition.
     pub id: u8,
     /// Its words.
     pub title: &'static str,
     /// The verdict.
-    pub verdict: Verdict,
+    pub verdict: PointVerdict,
     /// What is wrong, each with the way out.
     pub faults: Vec<String>,
     /// What is worth knowing and no fault.
@@ -61,49 +64,25 @@ pub const POINTS: [(u8, &str); 9] = [
     (11, "sweep: no penetration over each range, a millimetre free when closed"),
 ];
 
-/// Faults and remarks of one point.
-#[derive(Default)]
-pub(super) struct Said {
-    pub(super) concerned: bool,
-    /// Whether something that it is about was not looked at.
-    pub(super) unjudged: bool,
-    pub(super) faults: Vec<String>,
-    pub(super) told: Vec<String>,
-}
-
-impl Said {
-    pub(super) fn about(concerned: bool) -> Self {
-        Self { concerned, ..Self::default() }
-    }
-
-    pub(super) fn fault(&mut self, text: String) {
-        self.faults.push(text);
-    }
-
-    pub(super) fn tell(&mut self, text: String) {
-        self.told.push(text);
-    }
-}
-
-fn points(mut said: BTreeMap<u8, Said>) -> Vec<Point> {
+fn points(mut said: BTreeMap<u8, Findings>) -> Vec<CheckedPoint> {
     POINTS
         .into_iter()
         .map(|(id, title)| {
-            let Said { concerned, unjudged, faults, told } = said.remove(&id).unwrap_or_default();
+            let Findings { concerned, unjudged, faults, told } = said.remove(&id).unwrap_or_default();
             let verdict = match (faults.is_empty(), unjudged, concerned) {
-                (false, ..) => Verdict::Fail,
-                (true, true, _) => Verdict::NotJudged,
-                (true, false, true) => Verdict::Pass,
-                (true, false, false) => Verdict::NotApplicable,
+                (false, ..) => PointVerdict::Fail,
+                (true, true, _) => PointVerdict::NotJudged,
+                (true, false, true) => PointVerdict::Pass,
+                (true, false, false) => PointVerdict::NotApplicable,
             };
-            Point { id, title, verdict, faults, told }
+            CheckedPoint { id, title, verdict, faults, told }
         })
         .collect()
 }
 
 /// All points about a URDF or MJCF model; `twin` is the model that the file was written from, where there is one.
 #[must_use]
-pub fn model(model: &Model, twin: Option<&Twin>) -> Vec<Point> {
+pub fn model(model: &Model, twin: Option<&Twin>) -> Vec<CheckedPoint> {
     let (tree, broken) = match model.tree() {
         Ok(tree) => (Some(tree), Vec::new()),
         Err(faults) => (None, faults),
@@ -138,9 +117,14 @@ pub fn model(model: &Model, twin: Option<&Twin>) -> Vec<Point> {
 
 /// All points about a glTF scene; `twin` is the model that the file was written from, where there is one.
 #[must_use]
-pub fn scene(scene: &Scene, twin: Option<&Twin>) -> Vec<Point> {
+pub fn scene(scene: &GltfScene, twin: Option<&Twin>) -> Vec<CheckedPoint> {
     let there = |missing: &String| format!("{missing}; viewers refuse the file, or show it without");
-    let loads = Said { concerned: true, faults: scene.missing.iter().map(there).collect(), ..Said::default() };
+    let loads = Findings {
+        concerned: true,
+        unjudged: !scene.unread.is_empty(),
+        faults: scene.missing.iter().map(there).collect(),
+        told: scene.unread.clone(),
+    };
     let mut said = BTreeMap::from([(1, loads), (2, rigid_bodies::limits(&scene.joints)), (7, animations(scene, twin))]);
     // A file for physics engines must not be animated; what moves in it is not told by where its nodes are.
     if let Some(twin) = twin.filter(|_| !scene.is_physics) {
@@ -149,9 +133,9 @@ pub fn scene(scene: &Scene, twin: Option<&Twin>) -> Vec<Point> {
     points(said)
 }
 
-fn loads(model: &Model, tree: Option<&Tree>, broken: Vec<String>) -> Said {
-    let mut said = Said { concerned: true, faults: broken, ..Said::default() };
-    if let Format::Urdf { complaint, faults, .. } = &model.format {
+fn loads(model: &Model, tree: Option<&Tree>, broken: Vec<String>) -> Findings {
+    let mut said = Findings { concerned: true, faults: broken, ..Findings::default() };
+    if let ModelFormat::Urdf { complaint, faults, .. } = &model.format {
         said.faults.extend(faults.iter().cloned());
         if let Some(complaint) = complaint {
             said.fault(format!("urdf-rs, and whoever reads with it, refuses the file: {complaint}"));
@@ -161,17 +145,11 @@ fn loads(model: &Model, tree: Option<&Tree>, broken: Vec<String>) -> Said {
     said
 }
 
-/// A number for people: large and small ones with their power of ten.
-pub(super) fn plain(value: f64) -> String {
-    let size = value.abs();
-    if size == 0.0 || (1e-6..1e7).contains(&size) { value.to_string() } else { format!("{value:e}") }
-}
-
-fn base(model: &Model, tree: &Tree) -> Said {
-    let mut said = Said::about(true);
-    if let (Format::Urdf { keeps_links, .. }, Some(root)) = (&model.format, tree.order.first()) {
+fn base(model: &Model, tree: &Tree) -> Findings {
+    let mut said = Findings::about(true);
+    if let (ModelFormat::Urdf { keeps_links, .. }, Some(root)) = (&model.format, tree.order.first()) {
         let root = &model.links[*root].name;
-        if root != super::mjcf::WORLD {
+        if root != WORLD {
             said.fault(format!(
                 "nothing holds {root}: Drake and others let it fall; add <link name=\"world\"/> and a fixed joint from it to {root}"
             ));
@@ -188,7 +166,7 @@ fn base(model: &Model, tree: &Tree) -> Said {
     for (index, _) in model.moving() {
         let mut link = tree.carrier.iter().position(|c| *c == Some(index));
         while let Some(i) = link {
-            if let Some(carrier) = tree.carrier[i].filter(|c| model.joints[*c].kind == Kind::Free) {
+            if let Some(carrier) = tree.carrier[i].filter(|c| model.joints[*c].kind == JointType::Free) {
                 loose.insert(model.joints[carrier].child.as_str());
             }
             link = tree.parent[i];
@@ -207,13 +185,38 @@ fn some(names: &BTreeSet<String>) -> String {
     if more == 0 { shown.join(", ") } else { format!("{} and {more} more", shown.join(", ")) }
 }
 
-fn names(model: &Model, tree: Option<&Tree>) -> Said {
-    let mut said = Said::about(true);
-    let urdf = matches!(model.format, Format::Urdf { .. });
-    let mut all: Vec<(&str, &str)> = Vec::new();
+/// Point 5: safe names, boxes that can be touched, parts as large as furniture, handles.
+fn names(model: &Model, tree: Option<&Tree>) -> Findings {
+    let mut said = Findings::about(true);
+    name_faults(&mut said, &all_names(model));
+    for link in model.links.iter().filter(|l| l.collides_as_mesh) {
+        said.tell(format!(
+            "{}: collides as a mesh, that is as the mesh's convex hull in most simulators; a hollow part needs a box per board",
+            link.name
+        ));
+    }
+    let Some(tree) = tree else { return said };
+    traps::untouchable(&mut said, model, tree);
+    parts(&mut said, model, tree);
+    for (index, joint) in model.moving() {
+        let Some(child) = tree.carrier.iter().position(|c| *c == Some(index)) else { continue };
+        if !model.links[child].between && handle(model, tree, child).is_none() {
+            said.fault(format!(
+                "{}: no handle; name a link, geom or site of the part so that \"handle\" is in its name",
+                joint.name
+            ));
+        }
+    }
+    said
+}
+
+/// Everything that has a name of its file: what it is, and its name.
+fn all_names(model: &Model) -> Vec<(&'static str, &str)> {
+    let urdf = matches!(model.format, ModelFormat::Urdf { .. });
+    let mut all: Vec<(&'static str, &str)> = Vec::new();
     all.extend(model.links.iter().map(|l| ("link", l.name.as_str())));
     // MJCF has no fixed joints: those names are ours.
-    all.extend(model.joints.iter().filter(|j| urdf || j.kind != Kind::Fixed).map(|j| ("joint", j.name.as_str())));
+    all.extend(model.joints.iter().filter(|j| urdf || j.kind != JointType::Fixed).map(|j| ("joint", j.name.as_str())));
     for link in &model.links {
         let kind = |s: &Shape| {
             if !urdf {
@@ -227,6 +230,11 @@ fn names(model: &Model, tree: Option<&Tree>) -> Said {
         all.extend(link.shapes.iter().filter_map(|s| s.name.as_deref().map(|n| (kind(s), n))));
         all.extend(link.sites.iter().map(|(n, _)| ("site", n.as_str())).filter(|(_, n)| !n.is_empty()));
     }
+    all
+}
+
+/// Names that some program cannot take, that are there twice, or that things of different kinds share.
+fn name_faults(said: &mut Findings, all: &[(&'static str, &str)]) {
     let safe = |n: &str| !n.is_empty() && n.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
     let unsafe_names: BTreeSet<String> = all.iter().filter(|(_, n)| !safe(n)).map(|(_, n)| (*n).to_owned()).collect();
     if !unsafe_names.is_empty() {
@@ -234,7 +242,7 @@ fn names(model: &Model, tree: Option<&Tree>) -> Said {
     }
     let (mut seen, mut kinds) = (BTreeSet::new(), BTreeMap::<&str, BTreeSet<&str>>::new());
     let (mut twice, mut shared) = (BTreeSet::new(), BTreeSet::new());
-    for (kind, name) in all {
+    for &(kind, name) in all {
         if !seen.insert((kind, name)) {
             twice.insert(format!("{kind} {name}"));
         }
@@ -255,25 +263,6 @@ fn names(model: &Model, tree: Option<&Tree>) -> Said {
             some(&shared)
         ));
     }
-    for link in model.links.iter().filter(|l| l.collides_as_mesh) {
-        said.tell(format!(
-            "{}: collides as a mesh, that is as the mesh's convex hull in most simulators; a hollow part needs a box per board",
-            link.name
-        ));
-    }
-    let Some(tree) = tree else { return said };
-    traps::untouchable(&mut said, model, tree);
-    parts(&mut said, model, tree);
-    for (index, joint) in model.moving() {
-        let Some(child) = tree.carrier.iter().position(|c| *c == Some(index)) else { continue };
-        if !model.links[child].between && handle(model, tree, child).is_none() {
-            said.fault(format!(
-                "{}: no handle; name a link, geom or site of the part so that \"handle\" is in its name",
-                joint.name
-            ));
-        }
-    }
-    said
 }
 
 /// Where the handle of the rigid body around a link is, in the frame of the link that it belongs to: a site before a
@@ -306,9 +295,9 @@ pub(super) fn handle(model: &Model, tree: &Tree, link: usize) -> Option<(usize, 
         .or_else(|| body.iter().find_map(of_link))
 }
 
-fn mjcf(model: &Model) -> Said {
-    let Format::Mjcf { radian } = model.format else { return Said::default() };
-    let mut said = Said::about(true);
+fn mjcf(model: &Model) -> Findings {
+    let ModelFormat::Mjcf { radian, .. } = model.format else { return Findings::default() };
+    let mut said = Findings::about(true);
     if !radian {
         said.fault(
             "angles are degrees; write radians and <compiler angle=\"radian\"/>: one setting holds for all files that \
@@ -333,15 +322,15 @@ mod tests {
 
     use nalgebra::Matrix3;
 
-    use super::super::{Link, MassSource, ModelJoint};
+    use super::super::links::{Link, MassSource, ModelJoint};
     use super::*;
     use crate::math::Pose;
     use crate::math::Vector;
     use crate::twin::OrientedBox;
 
-    fn cabinet() -> Model {
-        let link = |name: &str, center: Vector, half: Vector, shape: &str| Link {
-            name: name.to_owned(),
+    /// A link with one box.
+    fn link(name: &str, center: Vector, half: Vector, shape: &str) -> Link {
+        Link {
             mass: Some(4.0),
             mass_source: MassSource::Stated,
             center: center.into(),
@@ -350,22 +339,16 @@ mod tests {
                 name: Some(shape.to_owned()),
                 bounds: OrientedBox { center: center.into(), half, rotation: Matrix3::identity() },
                 exact: true,
+                is_mesh: false,
                 visual: false,
                 masks: [1, 1],
             }],
-            meshes: Vec::new(),
-            collides_as_mesh: false,
-            incomplete: false,
-            sites: Vec::new(),
-            between: false,
-        };
-        let world = Link {
-            shapes: Vec::new(),
-            mass_source: MassSource::Nothing,
-            mass: None,
-            ..link("world", Vector::zeros(), Vector::zeros(), "")
-        };
-        let joint = |name: &str, kind: Kind, parent: &str, child: &str| ModelJoint {
+            ..Link::named(name.to_owned())
+        }
+    }
+
+    fn joint(name: &str, kind: JointType, parent: &str, child: &str) -> ModelJoint {
+        ModelJoint {
             name: name.to_owned(),
             kind,
             parent: parent.to_owned(),
@@ -382,24 +365,28 @@ mod tests {
             armature: None,
             limited: Some(true),
             start: 0.0,
-        };
+        }
+    }
+
+    fn cabinet() -> Model {
         Model {
             name: "c".to_owned(),
             source: PathBuf::from("c.urdf"),
-            format: Format::Urdf { keeps_links: true, complaint: None, faults: Vec::new() },
+            format: ModelFormat::Urdf { keeps_links: true, complaint: None, faults: Vec::new() },
             links: vec![
-                world,
+                Link { inertia: Matrix3::identity() * 0.1, ..Link::named("world".to_owned()) },
                 // A board behind a door that opens towards -y, about its left edge.
                 link("base", Vector::new(0.0, 0.3, 0.0), Vector::new(0.3, 0.25, 0.4), "board"),
                 link("door_link", Vector::zeros(), Vector::new(0.3, 0.01, 0.4), "door_handle"),
             ],
             joints: vec![
-                joint("fix", Kind::Fixed, "world", "base"),
-                ModelJoint { axis: -Vector::z(), ..joint("door", Kind::Revolute, "base", "door_link") },
+                joint("fix", JointType::Fixed, "world", "base"),
+                ModelJoint { axis: -Vector::z(), ..joint("door", JointType::Revolute, "base", "door_link") },
             ],
             excludes: Vec::new(),
             notes: Vec::new(),
             unread: Vec::new(),
+            held: Vec::new(),
             faults: Vec::new(),
         }
     }
@@ -412,9 +399,9 @@ mod tests {
     fn a_sound_cabinet_passes() {
         let points = super::model(&cabinet(), None);
         assert!(faults(&cabinet()).is_empty(), "{:?}", faults(&cabinet()));
-        let verdicts: Vec<(u8, Verdict)> = points.iter().map(|p| (p.id, p.verdict)).collect();
-        assert_eq!(verdicts[..2], [(1, Verdict::Pass), (2, Verdict::Pass)]);
-        assert!(verdicts.contains(&(6, Verdict::NotApplicable)) && verdicts.contains(&(11, Verdict::Pass)));
+        let verdicts: Vec<(u8, PointVerdict)> = points.iter().map(|p| (p.id, p.verdict)).collect();
+        assert_eq!(verdicts[..2], [(1, PointVerdict::Pass), (2, PointVerdict::Pass)]);
+        assert!(verdicts.contains(&(6, PointVerdict::NotApplicable)) && verdicts.contains(&(11, PointVerdict::Pass)));
     }
 
     #[test]
@@ -449,7 +436,7 @@ mod tests {
         let found = faults(&tight);
         assert_eq!(found.len(), 1, "{found:?}");
         assert!(found[0].0 == 11 && found[0].1.contains("share 2.0 mm when closed"), "{found:?}");
-        tight.format = Format::Mjcf { radian: true };
+        tight.format = ModelFormat::Mjcf { radian: true, limitless: false };
         tight.excludes.push(["door_link".to_owned(), "base".to_owned()]);
         assert!(faults(&tight).is_empty(), "{:?}", faults(&tight));
         // The other way round it opens into the board.

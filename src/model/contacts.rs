@@ -2,7 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{Format, Model, Tree};
+use super::links::{Model, ModelFormat};
+use super::tree::Tree;
 
 /// The contacts of a model that its file switches off.
 pub(super) struct Contacts<'a> {
@@ -24,7 +25,7 @@ impl<'a> Contacts<'a> {
             .filter_map(|[a, b]| find(a).zip(find(b)))
             .map(|(a, b)| (a.min(b), a.max(b)))
             .collect();
-        let is_mjcf = matches!(model.format, Format::Mjcf { .. });
+        let is_mjcf = matches!(model.format, ModelFormat::Mjcf { .. });
         let ground = tree.order.first().copied();
         let carrier = |link: usize| {
             let mut above = tree.parent[tree.body[link]]?;

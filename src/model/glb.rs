@@ -1,25 +1,26 @@
 //! What a glTF file (`.glb`, `.gltf`) does when its animations run: where things are, and how far it opens.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix4, Quaternion, UnitQuaternion};
 use serde_json::Value;
 
-use super::gltf_file::{self, File, Why, index, list, row};
+use super::gltf_file::{self, GltfFile, Unavailable, index, list, row};
+use super::gltf_keyframes::{KeyframeValue, KeyframeValues, Keyframes, UNIT_ERROR, keys};
 pub use super::rigid_bodies::{PhysicsJoint, PhysicsLimit};
 use super::{gltf_extensions, rigid_bodies, xml};
 use crate::articulation::JointKind;
 use crate::error::{Error, Result};
-use crate::math::{Point, Vector};
+use crate::math::{Point, Vector, rounded};
 
 /// Nodes times channels, and keyframes of all channels together: furniture has far fewer.
 const MAX_WORK: usize = 20_000_000;
 
 /// Where something is when a joint is closed, half open and open; world, +Z up, metres.
-pub type Places = [Point; 3];
+pub type PlacesOverRange = [Point; 3];
 
-/// The shares of a joint's range that [`Places`] stands for.
+/// The shares of a joint's range that [`PlacesOverRange`] stands for.
 pub const SHARES: [f64; 3] = [0.0, 0.5, 1.0];
 
 /// A node that an animation moves.
@@ -37,15 +38,15 @@ pub struct Moved {
     pub is_pivot: bool,
 }
 
-/// A scene.
+/// What a file shows, and what moves in it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Scene {
+pub struct GltfScene {
     /// The file.
     pub source: PathBuf,
     /// Moved nodes, in the order of the animations.
     pub moved: Vec<Moved>,
     /// Named nodes at and below moved ones.
-    pub places: BTreeMap<String, Places>,
+    pub places: BTreeMap<String, PlacesOverRange>,
     /// The file describes rigid bodies and joints for a physics engine (`KHR_physics_rigid_bodies`).
     pub is_physics: bool,
     /// Its joints for a physics engine.
@@ -54,6 +55,10 @@ pub struct Scene {
     pub required: Vec<String>,
     /// Files and bytes that it names and that are not there.
     pub missing: Vec<String>,
+    /// Files that it names and that are not looked at: they lie outside of the model's folder.
+    pub unread: Vec<String>,
+    /// Whether something turns or slides in a way that is not read.
+    pub hides_motion: bool,
     /// What breaks the format's rules.
     pub faults: Vec<String>,
     /// What its extensions mean for what is judged here.
@@ -62,25 +67,8 @@ pub struct Scene {
     pub notes: Vec<String>,
 }
 
-/// Keyframes of one channel.
-struct Channel {
-    times: Vec<f64>,
-    values: Values,
-}
-
-enum Values {
-    Turns(Vec<UnitQuaternion<f64>>),
-    Shifts(Vec<Vector>),
-}
-
-/// A node's value at a key or between two.
-enum Placed {
-    Turn(UnitQuaternion<f64>),
-    Shift(Vector),
-}
-
 /// A node as it stands in the file.
-struct Node {
+struct GltfNode {
     name: Option<String>,
     children: Vec<usize>,
     translation: Vector,
@@ -94,84 +82,147 @@ struct Node {
 ///
 /// # Errors
 /// Where it cannot be read, is no glTF 2, refers to what it does not have, or its nodes are no trees.
-pub fn read(path: &Path) -> Result<Scene> {
+pub fn read(path: &Path) -> Result<GltfScene> {
     let file = gltf_file::open(path)?;
     let json = &file.json;
-    let mut scene = Scene {
+    let mut scene = unmoved(path, &file);
+    let nodes: Vec<GltfNode> =
+        list(json, "nodes").iter().enumerate().map(|(i, n)| node(i, n, &mut scene.faults)).collect();
+    let fault = |text: &str| Error::format(path, "glTF", format!("is not valid ({text})"));
+    let parents = parents(&nodes).map_err(|e| fault(&e))?;
+    let still: Vec<Matrix4<f64>> = nodes.iter().map(GltfNode::local).collect();
+    let channels: usize = list(json, "animations").iter().map(|a| list(a, "channels").len()).sum();
+    if nodes.len().saturating_mul(channels) > MAX_WORK {
+        return Err(fault("too many nodes and animations for a piece of furniture"));
+    }
+    let mut player = AnimationPlayer {
+        file: &file,
+        nodes: &nodes,
+        still: &still,
+        parents: &parents,
+        left: MAX_WORK,
+        scene: &mut scene,
+    };
+    for animation in list(json, "animations") {
+        let mut set = BTreeSet::new();
+        for channel in list(animation, "channels") {
+            player.channel(animation, channel, &mut set);
+        }
+    }
+    let is_lost = |p: &Point| !p.coords.iter().all(|x| x.is_finite());
+    let lost = scene.places.iter().find(|(_, places)| places.iter().any(is_lost)).map(|(name, _)| name);
+    if let Some(name) = lost {
+        scene.faults.push(format!("{name}: its place is beyond all numbers; look at the scales and shifts above it"));
+    }
+    Ok(scene)
+}
+
+/// A scene before its animations are played, with what its file lacks.
+fn unmoved(path: &Path, file: &GltfFile) -> GltfScene {
+    let json = &file.json;
+    let mut scene = GltfScene {
         source: path.to_owned(),
         moved: Vec::new(),
         places: BTreeMap::new(),
         is_physics: gltf_extensions::uses(json, rigid_bodies::NAME),
         joints: rigid_bodies::joints(json),
         required: gltf_extensions::required(json),
-        missing: file.missing(path),
+        missing: Vec::new(),
+        unread: Vec::new(),
+        hides_motion: false,
         faults: gltf_extensions::faults(json),
         told: gltf_extensions::told(json),
         notes: Vec::new(),
     };
+    for why in file.missing(path) {
+        match why {
+            Unavailable::Broken(why) => scene.missing.push(why),
+            Unavailable::NotRead(why) => scene.unread.push(why),
+        }
+    }
     if file.trailing > 0 {
         scene.notes.push(format!("{} bytes follow the end that its header states", file.trailing));
     }
     if list(json, "scenes").iter().all(|s| list(s, "nodes").is_empty()) && !list(json, "nodes").is_empty() {
         scene.told.push("no scene of it shows a node: viewers show nothing".to_owned());
     }
-    let nodes: Vec<Node> = list(json, "nodes").iter().enumerate().map(|(i, n)| node(i, n, &mut scene.faults)).collect();
-    let fault = |text: &str| Error::format(path, "glTF", format!("is not valid ({text})"));
-    let parents = parents(&nodes).map_err(|e| fault(&e))?;
-    let still: Vec<Matrix4<f64>> = nodes.iter().map(Node::local).collect();
-    let channels: usize = list(json, "animations").iter().map(|a| list(a, "channels").len()).sum();
-    if nodes.len().saturating_mul(channels) > MAX_WORK {
-        return Err(fault("too many nodes and animations for a piece of furniture"));
-    }
-    let mut left = MAX_WORK;
-    for animation in list(json, "animations") {
-        for channel in list(animation, "channels") {
-            let Some((target, path)) = target(channel, nodes.len(), &mut scene.notes) else { continue };
-            let Some(moved_node) = nodes.get(target) else { continue };
-            let name = moved_node.name.clone().unwrap_or_else(|| format!("node {target}"));
-            if moved_node.matrix.is_some() {
-                scene.faults.push(format!(
-                    "{name}: is animated and has a matrix; write translation, rotation and scale instead"
-                ));
-                continue;
+    scene
+}
+
+/// Plays a file's animations, a channel at a time, and keeps in the scene what they move.
+struct AnimationPlayer<'a> {
+    file: &'a GltfFile,
+    nodes: &'a [GltfNode],
+    /// `parent_from_node` as the file has it.
+    still: &'a [Matrix4<f64>],
+    parents: &'a [Option<usize>],
+    /// Keyframes that may still be looked at.
+    left: usize,
+    scene: &'a mut GltfScene,
+}
+
+impl AnimationPlayer<'_> {
+    /// Plays one channel; `set` are the nodes and properties that the same animation has set before.
+    fn channel<'v>(&mut self, animation: &'v Value, channel: &'v Value, set: &mut BTreeSet<(usize, &'v str)>) {
+        let Some((target, path)) = target(channel, &self.file.json, self.scene) else { return };
+        let Some(node) = self.nodes.get(target) else { return };
+        let name = node.name.clone().unwrap_or_else(|| format!("node {target}"));
+        if !set.insert((target, path)) {
+            let shown = xml::brief(path);
+            self.scene.faults.push(format!("{name}: two channels of one animation set its {shown}; take one of them"));
+            return;
+        }
+        if node.matrix.is_some() {
+            self.scene
+                .faults
+                .push(format!("{name}: is animated and has a matrix; write translation, rotation and scale instead"));
+            return;
+        }
+        match self.keyframes(animation, channel, path) {
+            Ok(keys) => self.play(target, &name, &keys),
+            Err(Unavailable::NotRead(why)) => {
+                self.scene.hides_motion |= ["rotation", "translation"].contains(&path);
+                self.scene.notes.push(format!("{name}: its animation is not read: {why}"));
             }
-            let too_many = || Why::NotRead("there are too many keyframes".to_owned());
-            // Once there are too many, none is looked at any more: channels may share their numbers.
-            let keys = if left > 0 { keys(&file, animation, channel, path) } else { Err(too_many()) };
-            let keys = keys.and_then(|k| {
-                let rest = left.checked_sub(k.times.len());
-                left = rest.unwrap_or(0);
-                rest.map(|_| k).ok_or_else(too_many)
-            });
-            match keys {
-                Ok(keys) => {
-                    let above = world(parents.get(target).copied().flatten(), &still, &parents);
-                    let tree = Hung { nodes: &nodes, still: &still, above };
-                    let moved = tree.moved(target, &name, &keys, &list(json, "nodes")[target], &mut scene.places);
-                    if moved.reaches > 0.0 {
-                        scene.moved.push(moved);
-                    } else {
-                        scene.notes.push(format!("{name}: its animation moves nothing"));
-                    }
-                }
-                Err(Why::NotRead(why)) => scene.notes.push(format!("{name}: its animation is not read: {why}")),
-                Err(Why::Broken(why)) => scene.faults.push(format!("{name}: its animation is broken: {why}")),
+            Err(Unavailable::Broken(why)) => {
+                self.scene.faults.push(format!("{name}: its animation is broken: {why}"));
             }
         }
     }
-    let lost: Vec<&String> = scene
-        .places
-        .iter()
-        .filter(|(_, p)| p.iter().any(|p| !p.coords.iter().all(|x| x.is_finite())))
-        .map(|(n, _)| n)
-        .collect();
-    if let Some(name) = lost.first() {
-        scene.faults.push(format!("{name}: its place is beyond all numbers; look at the scales and shifts above it"));
+
+    /// The keyframes of a channel, unless all channels together have too many.
+    fn keyframes(
+        &mut self,
+        animation: &Value,
+        channel: &Value,
+        path: &str,
+    ) -> std::result::Result<Keyframes, Unavailable> {
+        let too_many = || Unavailable::NotRead("there are too many keyframes".to_owned());
+        // Once there are too many, none is looked at any more: channels may share their numbers.
+        if self.left == 0 {
+            return Err(too_many());
+        }
+        let keys = keys(self.file, animation, channel, path)?;
+        let rest = self.left.checked_sub(keys.times.len());
+        self.left = rest.unwrap_or(0);
+        rest.map(|_| keys).ok_or_else(too_many)
     }
-    Ok(scene)
+
+    /// Moves a node, and what it carries, through its keyframes.
+    fn play(&mut self, node: usize, name: &str, keys: &Keyframes) {
+        let above = world(self.parents.get(node).copied().flatten(), self.still, self.parents);
+        let tree = NodeTree { nodes: self.nodes, still: self.still, above };
+        let json = &list(&self.file.json, "nodes")[node];
+        let moved = tree.moved(node, name, keys, json, &mut self.scene.places);
+        if moved.reaches > 0.0 {
+            self.scene.moved.push(moved);
+        } else {
+            self.scene.notes.push(format!("{name}: its animation moves nothing"));
+        }
+    }
 }
 
-fn node(number: usize, value: &Value, faults: &mut Vec<String>) -> Node {
+fn node(number: usize, value: &Value, faults: &mut Vec<String>) -> GltfNode {
     let name = value["name"].as_str().map(str::to_owned);
     let label = || name.clone().unwrap_or_else(|| format!("node {number}"));
     let mut wrong = |key: &str, count: usize| faults.push(format!("{}: its {key} is not {count} numbers", label()));
@@ -195,15 +246,14 @@ fn node(number: usize, value: &Value, faults: &mut Vec<String>) -> Node {
         [0.0, 0.0, 0.0, 1.0]
     });
     let quaternion = Quaternion::new(w, x, y, z);
-    // What a validator forgives of rounding.
-    if (quaternion.norm() - 1.0).abs() > 1e-2 {
+    if (quaternion.norm() - 1.0).abs() > UNIT_ERROR {
         faults.push(format!(
-            "{}: its rotation has length {:.3}; a quaternion of length 1 is wanted",
+            "{}: its rotation has length {}; a quaternion of length 1 is wanted",
             label(),
-            quaternion.norm()
+            rounded(quaternion.norm(), 3)
         ));
     }
-    Node {
+    GltfNode {
         children: list(value, "children")
             .iter()
             .filter_map(|c| c.as_u64().and_then(|c| usize::try_from(c).ok()))
@@ -216,18 +266,18 @@ fn node(number: usize, value: &Value, faults: &mut Vec<String>) -> Node {
     }
 }
 
-impl Node {
+impl GltfNode {
     /// `parent_from_node` as the file has it.
     fn local(&self) -> Matrix4<f64> {
         self.matrix.unwrap_or_else(|| self.with(None))
     }
 
     /// The same with one of its parts replaced.
-    fn with(&self, value: Option<&Placed>) -> Matrix4<f64> {
+    fn with(&self, value: Option<&KeyframeValue>) -> Matrix4<f64> {
         let (mut shift, mut turn) = (self.translation, self.rotation);
         match value {
-            Some(Placed::Shift(s)) => shift = *s,
-            Some(Placed::Turn(t)) => turn = *t,
+            Some(KeyframeValue::Shift(s)) => shift = *s,
+            Some(KeyframeValue::Turn(t)) => turn = *t,
             None => {}
         }
         Matrix4::new_translation(&shift) * turn.to_homogeneous() * Matrix4::new_nonuniform_scaling(&self.scale)
@@ -235,7 +285,7 @@ impl Node {
 }
 
 /// Each node's parent; `Err` where nodes are no trees.
-fn parents(nodes: &[Node]) -> std::result::Result<Vec<Option<usize>>, String> {
+fn parents(nodes: &[GltfNode]) -> std::result::Result<Vec<Option<usize>>, String> {
     let mut parents: Vec<Option<usize>> = vec![None; nodes.len()];
     for (i, node) in nodes.iter().enumerate() {
         for child in &node.children {
@@ -268,85 +318,66 @@ fn world(node: Option<usize>, local: &[Matrix4<f64>], parents: &[Option<usize>])
     pose
 }
 
-/// The node that a channel moves and how; `None`, and a note, where it moves none.
-fn target<'a>(channel: &'a Value, nodes: usize, notes: &mut Vec<String>) -> Option<(usize, &'a str)> {
+/// The node that a channel moves and how; `None`, and a note or a fault, where it moves none.
+fn target<'a>(channel: &'a Value, json: &Value, scene: &mut GltfScene) -> Option<(usize, &'a str)> {
     let target = &channel["target"];
     if let Some(pointer) = target["extensions"]["KHR_animation_pointer"]["pointer"].as_str() {
+        if let Some(fault) = astray(json, pointer) {
+            scene.faults.push(fault);
+            return None;
+        }
         let inside = pointer.strip_prefix("/nodes/").and_then(|p| p.split_once('/'));
         let moves = inside.filter(|(_, path)| ["rotation", "translation"].contains(path));
-        let found = moves.and_then(|(n, path)| Some((n.parse::<usize>().ok().filter(|n| *n < nodes)?, path)));
+        let found = moves.and_then(|(n, path)| Some((n.parse::<usize>().ok()?, path)));
         if found.is_none() {
-            notes.push(format!("what animates {} is not read", xml::brief(pointer)));
+            scene.notes.push(format!("what animates {} is not read", xml::brief(pointer)));
         }
         return found;
     }
     let found = index(target, "node").and_then(|n| Some((n, target["path"].as_str()?)));
     if found.is_none() {
-        notes.push("an animation's channel moves no node and is passed over".to_owned());
+        scene.notes.push("an animation's channel moves no node and is passed over".to_owned());
     }
     found
 }
 
-/// Keyframes of a channel that turns or shifts.
-fn keys(file: &File, animation: &Value, channel: &Value, path: &str) -> std::result::Result<Channel, Why> {
-    let broken = |text: &str| Why::Broken(text.to_owned());
-    let sampler = index(channel, "sampler").and_then(|s| list(animation, "samplers").get(s));
-    let sampler = sampler.ok_or_else(|| broken("it has no sampler"))?;
-    let width = match path {
-        "rotation" => 4,
-        "translation" => 3,
-        "scale" | "weights" => return Err(Why::NotRead("it neither turns nor shifts".to_owned())),
-        other => return Err(Why::Broken(format!("it animates \"{}\", which nodes do not have", xml::brief(other)))),
+/// What is wrong with the pointer of an animation: that it is none, or that the entry of a list which it names is not there.
+fn astray(json: &Value, pointer: &str) -> Option<String> {
+    const LISTS: [&str; 6] = ["nodes", "materials", "meshes", "cameras", "skins", "scenes"];
+    let shown = xml::brief(pointer);
+    let Some(inside) = pointer.strip_prefix('/') else {
+        return Some(format!("an animation's pointer \"{shown}\" is none: pointers begin with /"));
     };
-    let accessor = |key: &str| index(sampler, key).ok_or_else(|| Why::Broken(format!("its sampler has no {key}")));
-    let times: Vec<f64> = file.rows(accessor("input")?, 1)?.concat();
-    let rows = file.rows(accessor("output")?, width)?;
-    // A spline's keyframe is a slope, the value, a slope.
-    let a_key = match sampler["interpolation"].as_str() {
-        None | Some("LINEAR" | "STEP") => 1,
-        Some("CUBICSPLINE") => 3,
-        Some(other) => return Err(Why::Broken(format!("\"{}\" is no interpolation", xml::brief(other)))),
+    let (what, rest) = inside.split_once('/')?;
+    let number = rest.split('/').next().unwrap_or_default();
+    let there = match &json[what] {
+        Value::Array(entries) => entries.len(),
+        Value::Null if LISTS.contains(&what) => 0,
+        _ => return None,
     };
-    if times.is_empty() || times.len().checked_mul(a_key) != Some(rows.len()) {
-        let (have, keys) = (rows.len(), times.len());
-        return Err(Why::Broken(format!("it has {have} values for {keys} keyframes, {a_key} for each are wanted")));
-    }
-    if !times.windows(2).all(|w| w[0] < w[1]) {
-        return Err(broken("its times do not rise"));
-    }
-    let rows = rows.iter().skip(a_key / 2).step_by(a_key);
-    let values = if width == 4 {
-        let turn = |v: &Vec<f64>| match v[..] {
-            [x, y, z, w] => UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-6),
-            _ => None,
-        };
-        let turns: Option<Vec<_>> = rows.map(turn).collect();
-        Values::Turns(turns.ok_or_else(|| broken("a rotation is 0"))?)
-    } else {
-        Values::Shifts(rows.map(|v| Vector::from_column_slice(v)).collect())
-    };
-    Ok(Channel { times, values })
+    let is_there = number.parse::<usize>().is_ok_and(|n| n < there);
+    (!is_there).then(|| format!("an animation points at {shown}, there are {there} {what}"))
 }
 
 /// Nodes with what is above the one that moves.
-struct Hung<'a> {
-    nodes: &'a [Node],
+struct NodeTree<'a> {
+    nodes: &'a [GltfNode],
     still: &'a [Matrix4<f64>],
     above: Matrix4<f64>,
 }
 
-impl Hung<'_> {
+impl NodeTree<'_> {
     /// What a channel does to a node; where all named nodes below are goes to `places`.
     fn moved(
         &self,
         node: usize,
         name: &str,
-        keys: &Channel,
+        keys: &Keyframes,
         json: &Value,
-        places: &mut BTreeMap<String, Places>,
+        places: &mut BTreeMap<String, PlacesOverRange>,
     ) -> Moved {
         let (open, mut reaches) = keys.farthest();
-        if let Values::Shifts(shifts) = &keys.values {
+        if let KeyframeValues::Shifts(shifts) = &keys.values {
             // Metres of the world: scales above count.
             reaches = self.above.transform_vector(&(shifts[open] - shifts[0])).norm();
         }
@@ -365,81 +396,17 @@ impl Hung<'_> {
             }
         }
         let kind = match keys.values {
-            Values::Turns(_) => JointKind::Revolute,
-            Values::Shifts(_) => JointKind::Prismatic,
+            KeyframeValues::Turns(_) => JointKind::Revolute,
+            KeyframeValues::Shifts(_) => JointKind::Prismatic,
         };
         let is_pivot = !self.nodes[node].children.is_empty();
         Moved { name: name.to_owned(), kind, reaches, upper: json["extras"]["joint"]["upper"].as_f64(), is_pivot }
     }
 }
 
-impl Channel {
-    /// The key that is farthest from the first, and how far that is, rad or m.
-    fn farthest(&self) -> (usize, f64) {
-        let mut best = (0, 0.0f64);
-        match &self.values {
-            Values::Shifts(shifts) => {
-                for (i, s) in shifts.iter().enumerate() {
-                    let far = (s - shifts[0]).norm();
-                    if far > best.1 {
-                        best = (i, far);
-                    }
-                }
-            }
-            Values::Turns(turns) => {
-                // Added up step by step: whole turns count.
-                let (mut angle, mut about) = (0.0f64, Vector::zeros());
-                for (i, pair) in turns.windows(2).enumerate() {
-                    let step = (pair[1] * pair[0].inverse()).scaled_axis();
-                    if about == Vector::zeros() {
-                        about = step;
-                    }
-                    angle += if step.dot(&about) < 0.0 { -step.norm() } else { step.norm() };
-                    if angle > best.1 {
-                        best = (i + 1, angle);
-                    }
-                }
-            }
-        }
-        best
-    }
-
-    /// The value at a time, linear between keys.
-    fn at(&self, time: f64) -> Placed {
-        let last = self.times.len() - 1;
-        // One keyframe holds still.
-        if last == 0 {
-            return match &self.values {
-                Values::Shifts(s) => Placed::Shift(s[0]),
-                Values::Turns(t) => Placed::Turn(t[0]),
-            };
-        }
-        let i = self.times.partition_point(|t| *t <= time).clamp(1, last);
-        let share = ((time - self.times[i - 1]) / (self.times[i] - self.times[i - 1])).clamp(0.0, 1.0);
-        match &self.values {
-            Values::Shifts(s) => Placed::Shift(s[i - 1].lerp(&s[i], share)),
-            // Half a turn has no shortest way; the first key is as good as any.
-            Values::Turns(t) => Placed::Turn(t[i - 1].try_slerp(&t[i], share, 1e-9).unwrap_or(t[i - 1])),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::rotation;
-
-    #[test]
-    fn more_than_half_a_turn_is_counted_as_such() {
-        let turns: Vec<_> = [0.0, 1.2, 2.4, 3.6, 2.4, 1.2, 0.0].map(|a| rotation(&Vector::y(), a)).to_vec();
-        let times = (0..7).map(f64::from).collect();
-        let channel = Channel { times, values: Values::Turns(turns) };
-        let (open, reaches) = channel.farthest();
-        assert_eq!(open, 3);
-        assert!((reaches - 3.6).abs() < 1e-9);
-        let Placed::Turn(half) = channel.at(1.5) else { panic!("a turn") };
-        assert!((half.angle() - 1.8).abs() < 1e-9);
-    }
 
     #[test]
     fn what_is_no_gltf_is_refused() {

@@ -7,6 +7,20 @@ use serde_json::Value;
 use super::gltf_file::list;
 use super::{rigid_bodies, xml};
 
+/// The registered prefixes.
+const PREFIXES: &str = include_str!("../../assets/gltf-prefixes.txt");
+
+/// Whether an extension's name begins with a registered prefix.
+fn is_registered(name: &str) -> bool {
+    let known = || PREFIXES.lines().filter(|l| !l.starts_with('#')).flat_map(str::split_ascii_whitespace);
+    name.split_once('_').is_some_and(|(prefix, _)| known().any(|k| k == prefix))
+}
+
+/// Whether several vendors share an extension.
+fn is_shared(name: &str) -> bool {
+    ["KHR_", "EXT_"].iter().any(|p| name.starts_with(p))
+}
+
 fn names(json: &Value, key: &str) -> Vec<String> {
     list(json, key).iter().filter_map(Value::as_str).map(str::to_owned).collect()
 }
@@ -46,11 +60,10 @@ pub(super) fn faults(json: &Value) -> Vec<String> {
         if !uses(json, &name) {
             out.push(format!("{shown} is required and not in extensionsUsed; list it there too"));
         }
-        // The registry has two prefixes that several vendors share; all others are one vendor's.
-        if !["KHR_", "EXT_"].iter().any(|p| name.starts_with(p)) {
+        if !is_registered(&name) {
             out.push(format!(
-                "{shown} is required, and is no extension that vendors share (KHR_, EXT_): whoever does not know it must \
-                 refuse the file; list it in extensionsUsed alone where the file can be shown without"
+                "{shown} is required, and is no extension that vendors share or have registered a prefix for: whoever does \
+                 not know it must refuse the file; list it in extensionsUsed alone where the file can be shown without"
             ));
         }
     }
@@ -84,9 +97,13 @@ pub(super) fn told(json: &Value) -> Vec<String> {
                 )
             } else if any(&["nodes", "scenes", "animations", "skins"]) {
                 format!("{shown} is required: what it does to nodes and animations is not judged")
-            } else {
+            } else if is_shared(name) {
                 format!(
                     "{shown} is required: readers without it must refuse the file, though nothing that moves needs it"
+                )
+            } else {
+                format!(
+                    "{shown} is required and one vendor's: few readers have it, and all others must refuse the file"
                 )
             }
         })
@@ -111,12 +128,17 @@ mod tests {
             ("KHR_texture_transform", "materials", "nothing that moves needs it"),
             ("EXT_mesh_gpu_instancing", "nodes", "nodes and animations is not judged"),
             (rigid_bodies::NAME, "nodes", "extensionsUsed is enough"),
+            ("MSFT_texture_dds", "textures", "is required and one vendor's"),
+            ("OMI_physics_body", "nodes", "nodes and animations is not judged"),
+            ("VRMC_vrm", "materials", "is required and one vendor's"),
         ] {
             let json = with(name, key);
             assert!(faults(&json).is_empty(), "{name}: {:?}", faults(&json));
             assert!(told(&json)[0].contains(word), "{name}: {:?}", told(&json));
         }
-        assert!(faults(&with("FOO_own", "nodes"))[0].contains("no extension that vendors share"));
+        for name in ["FOO_own", "VRM", "msft_own", "_own"] {
+            assert!(faults(&with(name, "nodes"))[0].contains("no extension that vendors share"), "{name}");
+        }
         let later = json!({"asset": {"version": "2.0", "minVersion": "2.1"}});
         assert!(faults(&later)[0].contains("2.1 at least"));
     }

@@ -20,22 +20,32 @@ const MAX_VALUES: usize = 4_000_000;
 const MAX_ROWS: usize = 1_000_000;
 
 /// A file that was read.
-pub(super) struct File {
+pub(super) struct GltfFile {
     /// The JSON part.
     pub json: Value,
     /// Each buffer's bytes, or why there are none.
-    buffers: Vec<std::result::Result<Vec<u8>, String>>,
+    buffers: Vec<std::result::Result<Vec<u8>, Unavailable>>,
     /// Bytes behind the end that the header states.
     pub trailing: usize,
 }
 
 /// Why numbers are not there.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Why {
+pub(super) enum Unavailable {
     /// The file is wrong.
     Broken(String),
     /// The file may be right, but this is not read here.
     NotRead(String),
+}
+
+impl Unavailable {
+    /// The same with what it is about before it.
+    fn behind(&self, what: &str) -> Self {
+        match self {
+            Self::Broken(why) => Self::Broken(format!("{what} {why}")),
+            Self::NotRead(why) => Self::NotRead(format!("{what} {why}")),
+        }
+    }
 }
 
 fn invalid(path: &Path, text: &str) -> Error {
@@ -46,7 +56,7 @@ fn invalid(path: &Path, text: &str) -> Error {
 ///
 /// # Errors
 /// Where it cannot be read, is no glTF 2, or refers to what it does not have.
-pub(super) fn open(path: &Path) -> Result<File> {
+pub(super) fn open(path: &Path) -> Result<GltfFile> {
     let bytes = xml::read_bytes(path, MAX_BYTES)?;
     let (json, blob, trailing) = if bytes.starts_with(b"glTF") {
         chunks(path, &bytes)?
@@ -71,7 +81,7 @@ pub(super) fn open(path: &Path) -> Result<File> {
     }
     references(&json).map_err(|e| invalid(path, &e))?;
     let buffers = buffers(path, &json, blob);
-    Ok(File { json, buffers, trailing })
+    Ok(GltfFile { json, buffers, trailing })
 }
 
 fn word(bytes: &[u8], at: usize) -> Option<usize> {
@@ -182,21 +192,20 @@ fn refers(json: &Value, key: &str, value: &Value, place: &str, own: Option<usize
 }
 
 /// The bytes of all buffers, together never more than [`MAX_BYTES`]; `Err` says why a buffer has none.
-fn buffers(path: &Path, json: &Value, blob: Option<&[u8]>) -> Vec<std::result::Result<Vec<u8>, String>> {
+fn buffers(path: &Path, json: &Value, blob: Option<&[u8]>) -> Vec<std::result::Result<Vec<u8>, Unavailable>> {
+    let broken = |text: &str| Unavailable::Broken(text.to_owned());
     let mut left = MAX_BYTES;
     let mut out = Vec::new();
     for (i, buffer) in list(json, "buffers").iter().enumerate() {
         let stated = buffer["byteLength"].as_u64().unwrap_or(0);
         let bytes = match buffer["uri"].as_str() {
             Some(uri) => from_uri(path, uri, left),
-            None if i == 0 => {
-                blob.map(<[u8]>::to_vec).ok_or_else(|| "has no uri, and the file no binary part".to_owned())
-            }
-            None => Err("has no uri".to_owned()),
+            None if i == 0 => blob.map(<[u8]>::to_vec).ok_or_else(|| broken("has no uri, and the file no binary part")),
+            None => Err(broken("has no uri")),
         };
         let bytes = bytes.and_then(|b| {
             let have = b.len() as u64;
-            if have < stated { Err(format!("says {stated} bytes, there are {have}")) } else { Ok(b) }
+            if have < stated { Err(broken(&format!("says {stated} bytes, there are {have}"))) } else { Ok(b) }
         });
         left = left.saturating_sub(bytes.as_ref().map_or(0, |b| b.len() as u64));
         out.push(bytes);
@@ -205,36 +214,44 @@ fn buffers(path: &Path, json: &Value, blob: Option<&[u8]>) -> Vec<std::result::R
 }
 
 /// The bytes behind a data URI, or of a file in or below the model's folder.
-fn from_uri(path: &Path, uri: &str, most: u64) -> std::result::Result<Vec<u8>, String> {
+fn from_uri(path: &Path, uri: &str, most: u64) -> std::result::Result<Vec<u8>, Unavailable> {
+    let broken = Unavailable::Broken;
     if let Some(data) = uri.strip_prefix("data:") {
-        let (kind, text) = data.split_once(',').ok_or("has a data URI without data")?;
+        let (kind, text) = data.split_once(',').ok_or_else(|| broken("has a data URI without data".to_owned()))?;
         if !kind.ends_with(";base64") {
-            return Err("has a data URI that is not base64".to_owned());
+            return Err(broken("has a data URI that is not base64".to_owned()));
         }
         // Four letters are three bytes.
         if text.len() as u64 / 4 * 3 > most {
-            return Err("is too large for a scene of furniture".to_owned());
+            return Err(broken("is too large for a scene of furniture".to_owned()));
         }
         let decoded = base64::engine::general_purpose::STANDARD.decode(text.trim_end());
-        return decoded.map_err(|e| format!("has a data URI that is not base64 ({e})"));
+        return decoded.map_err(|e| broken(format!("has a data URI that is not base64 ({e})")));
     }
     let file = beside(path, uri)?;
     if !file.is_file() {
-        return Err(format!("is in {}, which is not there", xml::brief(uri)));
+        return Err(broken(format!("is in {}, which is not there", xml::brief(uri))));
     }
-    let bytes = xml::read_bytes(&file, most).map_err(|e| e.to_string())?;
+    let bytes = xml::read_bytes(&file, most).map_err(|e| broken(e.to_string()))?;
     if kinds::is_pointer(&bytes) {
-        return Err(format!("is in {}, a Git LFS pointer; run `git lfs pull`", xml::brief(uri)));
+        return Err(broken(format!("is in {}, a Git LFS pointer; run `git lfs pull`", xml::brief(uri))));
     }
     Ok(bytes)
 }
 
-/// Where a URI of a file points: in or below the model's folder.
-fn beside(path: &Path, uri: &str) -> std::result::Result<std::path::PathBuf, String> {
+/// Where a URI of a file points: in or below the model's folder. What lies elsewhere is not looked at, though others may
+/// load it.
+fn beside(path: &Path, uri: &str) -> std::result::Result<std::path::PathBuf, Unavailable> {
     let relative = decoded(uri);
+    if relative.is_empty() {
+        return Err(Unavailable::Broken("has an empty uri".to_owned()));
+    }
     let inside = Path::new(&relative).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
-    if relative.is_empty() || relative.contains("://") || !inside {
-        return Err(format!("is at {}; only files in and below the model's folder are read", xml::brief(uri)));
+    if relative.contains("://") || !inside {
+        let shown = xml::brief(uri);
+        return Err(Unavailable::NotRead(format!(
+            "is at {shown}; only files in and below the model's folder are looked at"
+        )));
     }
     Ok(path.parent().unwrap_or(Path::new("")).join(relative))
 }
@@ -275,35 +292,40 @@ pub(super) fn row<const N: usize>(value: &Value, key: &str) -> Option<[f64; N]> 
     numbers?.try_into().ok()
 }
 
-impl File {
-    /// Buffers and pictures whose bytes are not there, each in words.
-    pub fn missing(&self, path: &Path) -> Vec<String> {
+impl GltfFile {
+    /// Why buffers and pictures have no bytes here: what is not there, or not looked at, each in words.
+    pub fn missing(&self, path: &Path) -> Vec<Unavailable> {
         let buffers = self.buffers.iter().enumerate();
         let compressed = |i: usize| {
             // The bytes of such a buffer are those that an extension unpacks.
             list(&self.json, "buffers").get(i).is_some_and(|b| b["extensions"].is_object() && b["uri"].is_null())
         };
-        let mut out: Vec<String> = buffers
+        let mut out: Vec<Unavailable> = buffers
             .filter(|(i, _)| !compressed(*i))
-            .filter_map(|(i, b)| b.as_ref().err().map(|why| format!("buffer {i} {why}")))
+            .filter_map(|(i, b)| b.as_ref().err().map(|why| why.behind(&format!("buffer {i}"))))
             .collect();
         for (i, image) in list(&self.json, "images").iter().enumerate() {
             let Some(uri) = image["uri"].as_str().filter(|u| !u.starts_with("data:")) else { continue };
             match beside(path, uri) {
                 Ok(file) if kinds::is_pointer(&kinds::head(&file)) => {
-                    out.push(format!("image {i} is in {}, a Git LFS pointer; run `git lfs pull`", xml::brief(uri)));
+                    let shown = xml::brief(uri);
+                    out.push(Unavailable::Broken(format!(
+                        "image {i} is in {shown}, a Git LFS pointer; run `git lfs pull`"
+                    )));
                 }
                 Ok(file) if file.is_file() => {}
-                Ok(_) => out.push(format!("image {i} is in {}, which is not there", xml::brief(uri))),
-                Err(why) => out.push(format!("image {i} {why}")),
+                Ok(_) => {
+                    out.push(Unavailable::Broken(format!("image {i} is in {}, which is not there", xml::brief(uri))))
+                }
+                Err(why) => out.push(why.behind(&format!("image {i}"))),
             }
         }
         out
     }
 
     /// Rows of `width` numbers of an accessor; integers must be normalised ones, and are shares then.
-    pub fn rows(&self, accessor: usize, width: usize) -> std::result::Result<Vec<Vec<f64>>, Why> {
-        let broken = |text: &str| Why::Broken(text.to_owned());
+    pub fn rows(&self, accessor: usize, width: usize) -> std::result::Result<Vec<Vec<f64>>, Unavailable> {
+        let broken = |text: &str| Unavailable::Broken(text.to_owned());
         let accessors = list(&self.json, "accessors");
         let accessor = accessors.get(accessor).ok_or_else(|| broken("its numbers are nowhere"))?;
         let fits = match accessor["type"].as_str() {
@@ -321,20 +343,22 @@ impl File {
         };
         let whole = kind != FLOAT && accessor["normalized"] != Value::Bool(true);
         if fits != width || size == 0 || whole {
-            return Err(Why::Broken(format!("its numbers are neither floats nor normalised, {width} a keyframe")));
+            return Err(Unavailable::Broken(format!(
+                "its numbers are neither floats nor normalised, {width} a keyframe"
+            )));
         }
         if accessor["sparse"].is_object() {
-            return Err(Why::NotRead("its numbers are stored sparsely".to_owned()));
+            return Err(Unavailable::NotRead("its numbers are stored sparsely".to_owned()));
         }
         let count = index(accessor, "count").ok_or_else(|| broken("its numbers are not counted"))?;
         if count > MAX_ROWS && count <= self.size() {
-            return Err(Why::NotRead(format!("it has {count} keyframes, more than {MAX_ROWS}")));
+            return Err(Unavailable::NotRead(format!("it has {count} keyframes, more than {MAX_ROWS}")));
         }
         let Some(view) = index(accessor, "bufferView").and_then(|v| list(&self.json, "bufferViews").get(v)) else {
-            return Err(Why::NotRead("its numbers are not stored in the file".to_owned()));
+            return Err(Unavailable::NotRead("its numbers are not stored in the file".to_owned()));
         };
         if let Some((extension, _)) = view["extensions"].as_object().and_then(|e| e.iter().next()) {
-            return Err(Why::NotRead(format!("its numbers are compressed with {}", xml::brief(extension))));
+            return Err(Unavailable::NotRead(format!("its numbers are compressed with {}", xml::brief(extension))));
         }
         let bytes = self.view(view)?;
         let outside = || broken("its numbers lie outside the file");
@@ -363,10 +387,10 @@ impl File {
         self.buffers.iter().map(|b| b.as_ref().map_or(0, Vec::len)).sum()
     }
 
-    fn view(&self, view: &Value) -> std::result::Result<&[u8], Why> {
-        let outside = || Why::Broken("its numbers lie outside the file".to_owned());
+    fn view(&self, view: &Value) -> std::result::Result<&[u8], Unavailable> {
+        let outside = || Unavailable::Broken("its numbers lie outside the file".to_owned());
         let buffer = index(view, "buffer").and_then(|b| self.buffers.get(b)).ok_or_else(outside)?;
-        let bytes = buffer.as_ref().map_err(|why| Why::Broken(format!("the buffer of its numbers {why}")))?;
+        let bytes = buffer.as_ref().map_err(|why| why.behind("the buffer of its numbers"))?;
         let start = index(view, "byteOffset").unwrap_or(0);
         let length = index(view, "byteLength").ok_or_else(outside)?;
         start.checked_add(length).and_then(|end| bytes.get(start..end)).ok_or_else(outside)

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use super::check::{Said, plain};
-use super::{Format, Link, MassSource, Model, Tree};
-use crate::math::Vector;
+use super::findings::Findings;
+use super::links::{Link, MassSource, Model, ModelFormat, WORLD};
+use super::tree::Tree;
+use crate::math::{Vector, plain};
 use crate::twin::{Twin, mass_properties};
 
 /// Less is a hair, not a part.
@@ -13,27 +14,26 @@ const MIN_MASS_KG: f64 = 0.05;
 const MAX_MASS_KG: f64 = 200.0;
 
 /// The third point; `twin` is the model that the file was written from, where there is one.
-pub(super) fn masses(model: &Model, tree: Option<&Tree>, twin: Option<&Twin>) -> Said {
+pub(super) fn masses(model: &Model, tree: Option<&Tree>, twin: Option<&Twin>) -> Findings {
     let moving: BTreeSet<&str> = model.moving().map(|(_, j)| j.child.as_str()).collect();
     // A wall may weigh what it likes; what moves, and what carries it, is furniture.
     let furniture: BTreeSet<&str> = model.moving().flat_map(|(_, j)| [j.child.as_str(), j.parent.as_str()]).collect();
-    let mut said = Said::about(false);
+    let mut said = Findings::about(false);
     let root = tree.and_then(|t| t.order.first().copied());
     for (i, link) in model.links.iter().enumerate() {
         let name = &link.name;
         let bare = link.shapes.is_empty() && link.meshes.is_empty();
         let frame_only = bare && link.mass_source == MassSource::Nothing && !moving.contains(name.as_str());
         // What is fixed to the world never moves and needs no mass; a link of the world's name is no body.
-        let in_world = tree
-            .zip(root)
-            .is_some_and(|(t, root)| t.body[i] == t.body[root] && model.links[root].name == super::mjcf::WORLD);
+        let in_world =
+            tree.zip(root).is_some_and(|(t, root)| t.body[i] == t.body[root] && model.links[root].name == WORLD);
         let massless = matches!(link.mass_source, MassSource::Nothing | MassSource::Assumed);
         if link.between || frame_only || (in_world && (massless || Some(i) == root)) {
             continue;
         }
         // MuJoCo takes bodies without joints, and what is fixed to them, as parts of the world: no force moves them.
         let stands =
-            tree.is_some_and(|t| t.body.get(i).copied() == root) && matches!(model.format, Format::Mjcf { .. });
+            tree.is_some_and(|t| t.body.get(i).copied() == root) && matches!(model.format, ModelFormat::Mjcf { .. });
         if stands && (link.mass_source != MassSource::Stated || link.inertia.iter().all(|m| *m == 0.0)) {
             continue;
         }
@@ -73,7 +73,7 @@ pub(super) fn masses(model: &Model, tree: Option<&Tree>, twin: Option<&Twin>) ->
     said
 }
 
-fn mass_of(said: &mut Said, link: &Link, mass: f64, is_furniture: bool) {
+fn mass_of(said: &mut Findings, link: &Link, mass: f64, is_furniture: bool) {
     let name = &link.name;
     if !(MIN_MASS_KG..=MAX_MASS_KG).contains(&mass) && (is_furniture || mass.is_nan() || mass <= 0.0) {
         said.fault(format!("{name}: {} kg; furniture's parts weigh {MIN_MASS_KG} to {MAX_MASS_KG} kg", plain(mass)));
@@ -95,7 +95,7 @@ fn mass_of(said: &mut Said, link: &Link, mass: f64, is_furniture: bool) {
 }
 
 /// Says what no body has as moments of inertia; false where they are beyond all numbers.
-fn moments_of(said: &mut Said, link: &Link) -> bool {
+fn moments_of(said: &mut Findings, link: &Link) -> bool {
     // Above every body, and where eigenvalues are no numbers any more.
     const MAX_MOMENT: f64 = 1e9;
     let name = &link.name;

@@ -8,10 +8,11 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::UnitQuaternion;
 
-use super::mesh::{self, Measured};
+use super::mesh_files::{self, MeshMeasures};
 use super::mjcf_schema::place;
+use super::png_files;
 use super::xml::{Element, brief};
-use crate::math::{Point, Vector};
+use crate::math::{Point, Vector, plain};
 
 /// Where `<compiler>` says that files lie, below the model's folder.
 #[derive(Debug, Clone, Default)]
@@ -54,7 +55,7 @@ impl Folders {
 
 /// Where a mesh's vertices come from.
 #[derive(Debug, Clone)]
-pub(super) enum Source {
+pub(super) enum VertexSource {
     /// A file.
     File(PathBuf),
     /// They are written in the model: lowest and highest corner.
@@ -65,8 +66,8 @@ pub(super) enum Source {
 
 /// A mesh of `<asset>`.
 #[derive(Debug, Clone)]
-pub(super) struct Mesh {
-    pub(super) source: Source,
+pub(super) struct MeshAsset {
+    pub(super) source: VertexSource,
     pub(super) scale: Vector,
     /// `refpos`: what of the file becomes the origin, file units.
     pub(super) origin: Vector,
@@ -78,24 +79,24 @@ pub(super) struct Mesh {
     pub(super) thin: OnceCell<bool>,
 }
 
-impl Mesh {
+impl MeshAsset {
     /// Whether it is there, and has no volume that others could run into. A flat file that is no shell is refused whoever
     /// shows it.
     pub(super) fn is_thin(&self) -> bool {
         *self.thin.get_or_init(|| match &self.source {
-            Source::File(path) => self.shell && mesh::measured(path).flat,
-            Source::Written(_) => false,
-            Source::Made(plate) => *plate,
+            VertexSource::File(path) => self.shell && mesh_files::measured(path).flat,
+            VertexSource::Written(_) => false,
+            VertexSource::Made(plate) => *plate,
         })
     }
 
     /// Lowest and highest corner as the simulator has it, metres; `Err` says why there are none.
     pub(super) fn bounds(&self) -> Result<[Point; 2], String> {
         let [low, high] = match &self.source {
-            Source::File(path) if !path.is_file() => return Err("there is no such file".to_owned()),
-            Source::File(path) => mesh::bounds(path)?,
-            Source::Written(corners) => *corners,
-            Source::Made(_) => return Err("the simulator makes it itself".to_owned()),
+            VertexSource::File(path) if !path.is_file() => return Err("there is no such file".to_owned()),
+            VertexSource::File(path) => mesh_files::bounds(path)?,
+            VertexSource::Written(corners) => *corners,
+            VertexSource::Made(_) => return Err("the simulator makes it itself".to_owned()),
         };
         let mut ends = [Vector::repeat(f64::INFINITY), Vector::repeat(f64::NEG_INFINITY)];
         for corner in 0..8 {
@@ -116,7 +117,7 @@ pub(super) fn missing(model: &Path, root: &Element, folders: &Folders) -> Vec<St
     let mut faults = Vec::new();
     let shells = root.all("default").any(shell_by_default);
     // A file that many meshes show is read once.
-    let mut measured: BTreeMap<PathBuf, Measured> = BTreeMap::new();
+    let mut measured: BTreeMap<PathBuf, MeshMeasures> = BTreeMap::new();
     for asset in root.children.iter().filter(|c| ["asset", "deformable"].contains(&c.name.as_str())) {
         for element in &asset.children {
             let before = faults.len();
@@ -124,8 +125,12 @@ pub(super) fn missing(model: &Path, root: &Element, folders: &Folders) -> Vec<St
                 let Some(file) = element.get(attribute).filter(|f| !f.is_empty()) else { return };
                 // What says its own type need not say it by its ending.
                 let endings: &[&str] = if element.get("content_type").is_some() { &[] } else { endings };
-                if let Some(why) = refused(&folders.path(model, folder, file), endings) {
+                let path = folders.path(model, folder, file);
+                let content = element.get("content_type");
+                if let Some(why) = refused(&path, endings) {
                     faults.push(format!("{}: {}: {why}", place(model, element), brief(file)));
+                } else if let Some(why) = no_picture(&path, element, content) {
+                    faults.push(format!("{}: {}: {why}; MuJoCo refuses the model", place(model, element), brief(file)));
                 }
             };
             match element.name.as_str() {
@@ -146,7 +151,7 @@ pub(super) fn missing(model: &Path, root: &Element, folders: &Folders) -> Vec<St
                 let file = element.get("file").filter(|f| !f.is_empty()).map(|f| folders.mesh(model, f));
                 let found = file
                     .filter(|f| f.is_file())
-                    .map(|f| measured.entry(f).or_insert_with_key(|f| mesh::measured(f)).clone());
+                    .map(|f| measured.entry(f).or_insert_with_key(|f| mesh_files::measured(f)).clone());
                 if let Some(why) = no_solid(element, found.as_ref(), shell) {
                     faults.push(format!("{}: {why}; MuJoCo refuses it", place(model, element)));
                 }
@@ -156,6 +161,18 @@ pub(super) fn missing(model: &Path, root: &Element, folders: &Folders) -> Vec<St
     faults
 }
 
+/// Why a picture, or a height field from one, cannot be read.
+fn no_picture(path: &Path, element: &Element, content_type: Option<&str>) -> Option<&'static str> {
+    if !["texture", "hfield"].contains(&element.name.as_str()) {
+        return None;
+    }
+    let named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
+    if content_type.map_or(named, |kind| kind == "image/png") {
+        return png_files::broken_png(path);
+    }
+    std::fs::metadata(path).is_ok_and(|m| m.len() == 0).then_some("is empty")
+}
+
 /// Whether a default says that meshes are shells.
 fn shell_by_default(default: &Element) -> bool {
     default.all("mesh").any(|m| m.get("inertia") == Some("shell")) || default.all("default").any(shell_by_default)
@@ -163,7 +180,7 @@ fn shell_by_default(default: &Element) -> bool {
 
 /// Why a mesh is no solid: from its file where it has one, else from the vertices that are written; `shell` says that it
 /// need not be one.
-fn no_solid(element: &Element, file: Option<&Measured>, shell: bool) -> Option<String> {
+fn no_solid(element: &Element, file: Option<&MeshMeasures>, shell: bool) -> Option<String> {
     let scaled_away = element.numbers::<3>("scale").ok().flatten().is_some_and(|s| s.contains(&0.0));
     if scaled_away && !shell {
         return Some("its scale leaves no volume".to_owned());
@@ -172,9 +189,9 @@ fn no_solid(element: &Element, file: Option<&Measured>, shell: bool) -> Option<S
         let text = element.get(attribute).filter(|t| !t.trim().is_empty())?;
         element.parse(attribute, text, 0..=usize::MAX).ok()
     };
-    let flat = |flat: bool| (flat && !shell).then(|| mesh::FLAT.to_owned());
+    let flat = |flat: bool| (flat && !shell).then(|| mesh_files::FLAT.to_owned());
     if let Some(found) = file {
-        return found.hollow.clone().or_else(|| flat(found.flat));
+        return found.faces.clone().or_else(|| found.hollow.clone()).or_else(|| flat(found.flat));
     }
     let vertices = numbers("vertex")?;
     if vertices.len() % 3 != 0 {
@@ -186,9 +203,9 @@ fn no_solid(element: &Element, file: Option<&Measured>, shell: bool) -> Option<S
     }
     let count = vertices.len() / 3;
     if let Some(index) = faces.iter().find(|i| !(0.0..count as f64).contains(*i)) {
-        return Some(format!("a face names vertex {index}, there are {count}"));
+        return Some(format!("a face names vertex {}, there are {count}", plain(*index)));
     }
-    let (hollow, is_flat) = mesh::solid(&vertices);
+    let (hollow, is_flat) = mesh_files::solid(&vertices);
     hollow.or_else(|| flat(is_flat))
 }
 
@@ -239,10 +256,9 @@ mod tests {
         assert_eq!(folders.mesh(Path::new("d/m.xml"), "x/y.obj"), Path::new("d/b/y.obj"));
     }
 
-    #[test]
-    fn a_file_that_mujoco_refuses_is_told_from_one_that_it_reads() {
-        let dir = tempfile::tempdir().unwrap();
-        let write = |name: &str, bytes: &[u8]| std::fs::write(dir.path().join(name), bytes).unwrap();
+    /// Writes files that the simulator reads, and some that it refuses.
+    fn write_files(dir: &Path) {
+        let write = |name: &str, bytes: &[u8]| std::fs::write(dir.join(name), bytes).unwrap();
         let corners = [[0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let mut stl = vec![0u8; 80];
         stl.extend(4u32.to_le_bytes());
@@ -255,11 +271,20 @@ mod tests {
         write("text.stl", b"solid x\nfacet\nendsolid\n");
         write("pointer.obj", b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n");
         write("picture.jpg", b"x");
+        write("text.png", b"not a picture");
+        write("empty.ktx", b"");
+        write("beyond.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 9\n");
         write("good.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
         write("three.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
         write("line.obj", b"v 0 0 0\nv 1 1 1\nv 2 2 2\nv 3 3 3\nf 1 2 3\nf 2 4 3\n");
         write("tilted.obj", b"v 0 0 0\nv 1 0 1\nv 0 1 0\nv 1 1 1\nf 1 2 3\nf 2 4 3\n");
         write("small.obj", b"v 0 0 0\nv 1e-7 0 0\nv 0 1e-7 0\nv 0 0 1e-7\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+    }
+
+    #[test]
+    fn a_file_that_mujoco_refuses_is_told_from_one_that_it_reads() {
+        let dir = tempfile::tempdir().unwrap();
+        write_files(dir.path());
         for (body, word) in [
             ("<mesh file=\"good.stl\"/>", ""),
             ("<mesh file=\"good.obj\"/>", ""),
@@ -282,6 +307,14 @@ mod tests {
             ("<mesh file=\"text.stl\"/>", "binary STL"),
             ("<texture fileup=\"gone.png\"/>", "gone.png: there is no such file"),
             ("<texture file=\"picture.jpg\"/>", "MuJoCo reads PNG, KTX"),
+            ("<texture file=\"text.png\"/>", "text.png: is no PNG"),
+            ("<texture fileup=\"text.png\"/>", "text.png: is no PNG"),
+            ("<texture file=\"picture.jpg\" content_type=\"image/png\"/>", "picture.jpg: is no PNG"),
+            ("<texture file=\"text.png\" content_type=\"image/ktx\"/>", ""),
+            ("<hfield file=\"text.png\"/>", "text.png: is no PNG"),
+            ("<texture file=\"empty.ktx\"/>", "is empty"),
+            ("<mesh file=\"beyond.obj\"/>", "a face in line 6 names vertex 9, there are 4"),
+            ("<mesh file=\"beyond.obj\" inertia=\"shell\"/>", "names vertex 9"),
         ] {
             let model = dir.path().join("m.xml");
             let root = xml::parse(&model, &format!("<mujoco><asset>{body}</asset></mujoco>")).unwrap();

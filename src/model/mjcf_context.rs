@@ -6,7 +6,7 @@ use std::path::Path;
 
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
 
-use super::mjcf_assets::{Folders, Mesh, Source};
+use super::mjcf_assets::{Folders, MeshAsset, VertexSource};
 use super::weights::Mended;
 use super::xml::{self, Element};
 use crate::error::Result;
@@ -30,7 +30,10 @@ fn bytes(class: &Class) -> usize {
 pub(super) struct Context {
     pub(super) radian: bool,
     pub(super) autolimits: bool,
-    pub(super) euler: [char; 3],
+    /// Axes of Euler angles in their order; none where one of the letters is no axis, which only matters to who uses them.
+    pub(super) euler: Option<[char; 3]>,
+    /// A `<flag>` switches all limits off.
+    pub(super) limitless: bool,
     pub(super) folders: Folders,
     /// `Some` where `inertiafromgeom` is not "auto".
     pub(super) from_shapes: Option<bool>,
@@ -44,7 +47,7 @@ pub(super) struct Context {
     /// Bytes of all classes, about.
     class_bytes: usize,
     /// By name.
-    pub(super) meshes: BTreeMap<String, Mesh>,
+    pub(super) meshes: BTreeMap<String, MeshAsset>,
 }
 
 impl Context {
@@ -52,7 +55,8 @@ impl Context {
         let mut context = Self {
             radian: false,
             autolimits: true,
-            euler: ['x', 'y', 'z'],
+            euler: Some(['x', 'y', 'z']),
+            limitless: switched_off(root, &["limit", "constraint"]),
             folders: Folders::default(),
             from_shapes: None,
             weighing: [0.0, 5.0],
@@ -63,54 +67,65 @@ impl Context {
             meshes: BTreeMap::new(),
         };
         for compiler in root.all("compiler") {
-            if let Some(angle) = compiler.get("angle") {
-                context.radian = angle == "radian";
-            }
-            if let Some(value) = compiler.get("autolimits") {
-                context.autolimits = value == "true";
-            }
-            if let Some(sequence) = compiler.get("eulerseq") {
-                let axes: Vec<char> = sequence.chars().take(4).collect();
-                context.euler = <[char; 3]>::try_from(axes)
-                    .ok()
-                    .filter(|s| s.iter().all(|c| "xyzXYZ".contains(*c)))
-                    .ok_or_else(|| compiler.error("eulerseq must be three of x y z X Y Z"))?;
-            }
-            context.folders.take(compiler);
-            context.weighing = compiler.numbers::<2>("inertiagrouprange")?.unwrap_or(context.weighing);
-            context.total = compiler.number("settotalmass")?.filter(|m| *m > 0.0).or(context.total);
-            for bound in ["boundmass", "boundinertia"] {
-                context.mended.bounded |= compiler.number(bound)?.is_some_and(|b| b > 0.0);
-            }
-            if let Some(value) = compiler.get("balanceinertia") {
-                context.mended.balanced = value == "true";
-            }
-            match compiler.get("inertiafromgeom") {
-                Some("true") => context.from_shapes = Some(true),
-                Some("false") => context.from_shapes = Some(false),
-                _ => {}
-            }
-            if compiler.get("coordinate") == Some("global") {
-                return Err(compiler.error("global coordinates are not part of MJCF any more; save it with local ones"));
-            }
+            context.compiler(compiler)?;
         }
+        context.defaults(root)?;
+        for asset in root.all("asset").flat_map(|a| a.all("mesh")) {
+            context.mesh(model, asset)?;
+        }
+        Ok(context)
+    }
+
+    /// Takes what a `<compiler>` says; the last one counts.
+    fn compiler(&mut self, compiler: &Element) -> Result<()> {
+        if let Some(angle) = compiler.get("angle") {
+            self.radian = angle == "radian";
+        }
+        if let Some(value) = compiler.get("autolimits") {
+            self.autolimits = value == "true";
+        }
+        if let Some(sequence) = compiler.get("eulerseq") {
+            let axes: Vec<char> = sequence.chars().take(4).collect();
+            let axes =
+                <[char; 3]>::try_from(axes).map_err(|_| compiler.error("eulerseq must be three of x y z X Y Z"))?;
+            self.euler = Some(axes).filter(|s| s.iter().all(|c| "xyzXYZ".contains(*c)));
+        }
+        self.folders.take(compiler);
+        self.weighing = compiler.numbers::<2>("inertiagrouprange")?.unwrap_or(self.weighing);
+        self.total = compiler.number("settotalmass")?.filter(|m| *m > 0.0).or(self.total);
+        for bound in ["boundmass", "boundinertia"] {
+            self.mended.bounded |= compiler.number(bound)?.is_some_and(|b| b > 0.0);
+        }
+        if let Some(value) = compiler.get("balanceinertia") {
+            self.mended.balanced = value == "true";
+        }
+        match compiler.get("inertiafromgeom") {
+            Some("true") => self.from_shapes = Some(true),
+            Some("false") => self.from_shapes = Some(false),
+            _ => {}
+        }
+        if compiler.get("coordinate") == Some("global") {
+            return Err(compiler.error("global coordinates are not part of MJCF any more; save it with local ones"));
+        }
+        Ok(())
+    }
+
+    /// Reads all default classes. The outermost one is the main class, whatever its name is.
+    fn defaults(&mut self, root: &Element) -> Result<()> {
         let mut first = true;
         for element in root.all("default") {
             match element.get("class").filter(|c| *c != MAIN) {
-                Some(name) if !first => context.class(element, name, MAIN)?,
+                Some(name) if !first => self.class(element, name, MAIN)?,
                 alias => {
-                    context.class(element, MAIN, MAIN)?;
-                    if let (Some(alias), Some(main)) = (alias, context.classes.get(MAIN).cloned()) {
-                        context.classes.insert(alias.to_owned(), main);
+                    self.class(element, MAIN, MAIN)?;
+                    if let (Some(alias), Some(main)) = (alias, self.classes.get(MAIN).cloned()) {
+                        self.classes.insert(alias.to_owned(), main);
                     }
                 }
             }
             first = false;
         }
-        for asset in root.all("asset").flat_map(|a| a.all("mesh")) {
-            context.mesh(model, asset)?;
-        }
-        Ok(context)
+        Ok(())
     }
 
     fn mesh(&mut self, model: &Path, asset: &Element) -> Result<()> {
@@ -123,16 +138,16 @@ impl Context {
         let turn = asset.numbers::<4>("refquat")?.and_then(|[w, x, y, z]| turn_of(w, x, y, z));
         let turn = turn.unwrap_or_else(UnitQuaternion::identity);
         let source = match (file, corners(asset)?) {
-            (Some(file), _) => Source::File(self.folders.mesh(model, file)),
-            (None, Some(corners)) => Source::Written(corners),
-            (None, None) => Source::Made(asset.get("builtin") == Some("plate")),
+            (Some(file), _) => VertexSource::File(self.folders.mesh(model, file)),
+            (None, Some(corners)) => VertexSource::Written(corners),
+            (None, None) => VertexSource::Made(asset.get("builtin") == Some("plate")),
         };
         let stem = file.and_then(|f| f.rsplit(['/', '\\']).next()).map(Path::new).and_then(Path::file_stem);
         let Some(name) = asset.get("name").map(str::to_owned).or(stem.map(|s| s.to_string_lossy().into_owned())) else {
             return Ok(());
         };
         let shell = r.get("inertia") == Some("shell");
-        self.meshes.insert(name, Mesh { source, scale, origin, turn, shell, thin: OnceCell::new() });
+        self.meshes.insert(name, MeshAsset { source, scale, origin, turn, shell, thin: OnceCell::new() });
         Ok(())
     }
 
@@ -199,14 +214,20 @@ impl Context {
                 Ok(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes)))
             }
             "zaxis" => Ok(from_z(&unit(&vector(0)).ok_or_else(none)?)),
+            _ if self.euler.is_none() => {
+                let message =
+                    "euler: the compiler's eulerseq has a letter that is none of x y z X Y Z; write the order of axes";
+                Err(r.element.error(message))
+            }
             _ => Ok(self.turn(&v)),
         }
     }
 
-    /// The turn of Euler angles, which are as the file writes them.
+    /// The turn of Euler angles, which are as the file writes them; none where their axes are not known, as MuJoCo has it in
+    /// a `<replicate>`.
     pub(super) fn turn(&self, angles: &[f64]) -> UnitQuaternion<f64> {
         let mut turn = UnitQuaternion::identity();
-        for (axis, value) in self.euler.iter().zip(angles) {
+        for (axis, value) in self.euler.iter().flatten().zip(angles) {
             let about = match axis.to_ascii_lowercase() {
                 'x' => Vector::x(),
                 'y' => Vector::y(),
@@ -237,6 +258,12 @@ fn corners(asset: &Element) -> Result<Option<[Point; 2]>> {
 }
 
 pub(super) const MAIN: &str = "main";
+
+/// Whether the last `<flag>` that says something of one of these disables it.
+pub(super) fn switched_off(root: &Element, names: &[&str]) -> bool {
+    let flags = || root.all("option").flat_map(|o| o.all("flag"));
+    names.iter().any(|name| flags().filter_map(|f| f.get(name)).last() == Some("disable"))
+}
 
 /// The shortest turn that brings z to a unit direction.
 pub(super) fn from_z(direction: &Vector) -> UnitQuaternion<f64> {

@@ -2,17 +2,18 @@
 
 use nalgebra::Matrix3;
 
-use super::mjcf::{Builder, Portion};
+use super::links::Shape;
+use super::mjcf_builder::{MjcfBuilder, Portion};
 use super::mjcf_context::{Context, Resolved, from_z};
 use super::shapes::Primitive;
-use super::{Shape, xml};
+use super::xml;
 use crate::error::Result;
 use crate::math::{Point, Pose, Vector, unit};
 
 /// MuJoCo's default density: that of water, kg/m^3.
 const WATER: f64 = 1000.0;
 
-impl Builder {
+impl MjcfBuilder {
     /// Adds a geom to a link; `place` is the frame that it stands in.
     pub(super) fn geom(&mut self, c: &Context, r: &Resolved, link: usize, place: &Pose) -> Result<()> {
         let kind = r.get("type").unwrap_or("sphere");
@@ -51,7 +52,8 @@ impl Builder {
             }
         }
         let visual = masks == [0, 0];
-        self.model.links[link].shapes.push(Shape { name, bounds, exact: primitive.is_box(), visual, masks });
+        let (exact, is_mesh) = (primitive.is_box(), matches!(primitive, Primitive::Mesh(_)));
+        self.model.links[link].shapes.push(Shape { name, bounds, exact, is_mesh, visual, masks });
         Ok(())
     }
 

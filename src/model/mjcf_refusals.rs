@@ -3,12 +3,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::mjcf_assets::Mesh;
+use super::links::{JointType, Model, WORLD};
+use super::mjcf_assets::MeshAsset;
 use super::mjcf_context::{Context, MAIN, Resolved};
-use super::mjcf_schema::{Row, Value, place};
+use super::mjcf_schema::{ElementRule, Value, place};
 use super::mjcf_tree::Copies;
 use super::xml::{Element, brief};
-use super::{Kind, Model, mjcf, mjcf_geoms, mjcf_values, weights};
+use super::{mjcf_geoms, mjcf_values, weights};
+use crate::math::plain;
 
 /// Everything of this kind, and what is only worth a note; `root` is the whole tree, with copies made.
 pub(super) fn refusals(c: &Context, root: &Element, copies: &Copies, model: &Model) -> (Vec<String>, Vec<String>) {
@@ -24,12 +26,13 @@ pub(super) fn refusals(c: &Context, root: &Element, copies: &Copies, model: &Mod
         notes: Vec::new(),
         mocaps: 0,
         actuators: root.all("actuator").map(|a| a.children.len()).sum(),
+        plugins: root.all("extension").flat_map(|e| e.all("plugin")).filter_map(|p| p.get("plugin")).collect(),
     };
-    if let Some(row) = Row::root() {
-        out.names.entry("body").or_default().insert(mjcf::WORLD.to_owned());
+    if let Some(row) = ElementRule::root() {
+        out.names.entry("body").or_default().insert(WORLD.to_owned());
         out.names.entry("default").or_default().insert(MAIN.to_owned());
         out.collect(root, row);
-        let at = At { class: None, moving: false, below_world: true, weighs: false, default: false };
+        let at = ElementPlace { class: None, moving: false, below_world: true, weighs: false, default: false };
         out.element(root, row, at);
     }
     for default in root.all("default") {
@@ -47,7 +50,7 @@ pub(super) fn refusals(c: &Context, root: &Element, copies: &Copies, model: &Mod
 
 /// Where an element stands.
 #[derive(Clone, Copy)]
-struct At<'a> {
+struct ElementPlace<'a> {
     /// The class that holds for what names none.
     class: Option<&'a str>,
     /// In a body that joints move.
@@ -73,6 +76,8 @@ struct Refusals<'a> {
     notes: Vec<String>,
     mocaps: usize,
     actuators: usize,
+    /// Plugins that the file says it has.
+    plugins: Vec<&'a str>,
 }
 
 /// Kinds that the file itself must have, unless other models, which bring their own, are attached.
@@ -85,7 +90,7 @@ impl Refusals<'_> {
     }
 
     /// All names, and a fault for each that is there twice.
-    fn collect(&mut self, element: &Element, row: &'static Row) {
+    fn collect(&mut self, element: &Element, row: &'static ElementRule) {
         self.attaches |= element.name == "attach";
         for (attribute, known) in &row.attributes {
             let Value::Own(kind) = known.value else { continue };
@@ -104,7 +109,7 @@ impl Refusals<'_> {
         }
     }
 
-    fn element(&mut self, element: &Element, row: &'static Row, at: At) {
+    fn element(&mut self, element: &Element, row: &'static ElementRule, at: ElementPlace) {
         // An unknown class is told as any other name that names nothing.
         let c = self.c;
         let resolved = c.resolved(element, at.class).unwrap_or(Resolved { element, class: None });
@@ -126,7 +131,7 @@ impl Refusals<'_> {
         {
             self.fault(element, wrong);
         }
-        let mut inside = At { class: element.get("childclass").or(at.class), ..at };
+        let mut inside = ElementPlace { class: element.get("childclass").or(at.class), ..at };
         match element.name.as_str() {
             "default" => inside.default = true,
             "body" if !at.default => {
@@ -146,6 +151,15 @@ impl Refusals<'_> {
                 self.joint(element, &resolved);
             }
             "actuator" => element.children.iter().for_each(|a| self.actuator(a)),
+            "fixed" | "spatial" if !at.default && row.attributes.contains_key("springlength") => {
+                self.tendon(element, at)
+            }
+            // Models that are attached bring their plugins.
+            "plugin" if !at.default && !self.attaches && self.model.unread.is_empty() => {
+                if let Some(wrong) = mjcf_values::plugin(&resolved, row, &self.plugins) {
+                    self.fault(element, wrong);
+                }
+            }
             _ => {}
         }
         for child in &element.children {
@@ -165,7 +179,7 @@ impl Refusals<'_> {
     }
 
     /// `class` is the one that holds for what is in the body.
-    fn body(&mut self, element: &Element, class: Option<&str>, at: At) {
+    fn body(&mut self, element: &Element, class: Option<&str>, at: ElementPlace) {
         let joints = joints(element);
         if element.get("mocap") == Some("true") {
             self.mocaps += 1;
@@ -185,7 +199,7 @@ impl Refusals<'_> {
         }
     }
 
-    fn geom(&mut self, element: &Element, r: &Resolved, at: At) {
+    fn geom(&mut self, element: &Element, r: &Resolved, at: ElementPlace) {
         let kind = r.get("type").unwrap_or("sphere");
         match kind {
             "plane" if at.moving => {
@@ -197,7 +211,9 @@ impl Refusals<'_> {
             "hfield" if r.get("hfield").is_none_or(str::is_empty) => {
                 self.fault(element, "a height field needs its hfield")
             }
-            "mesh" if r.get("mesh").and_then(|m| self.c.meshes.get(m)).is_some_and(Mesh::is_thin) && collides(r) => {
+            "mesh"
+                if r.get("mesh").and_then(|m| self.c.meshes.get(m)).is_some_and(MeshAsset::is_thin) && collides(r) =>
+            {
                 self.fault(
                     element,
                     "its mesh is flat and cannot collide: take a thin box, or contype=\"0\" conaffinity=\"0\"",
@@ -228,9 +244,25 @@ impl Refusals<'_> {
                 self.fault(element, "has a range but not limited, and autolimits is off: write limited=\"true\"");
             }
             "true" if kind != "ball" && low >= high => {
+                let [low, high] = [low, high].map(plain);
                 self.fault(element, format!("is limited to {low} to {high}, which is no range: write range=\"0 ...\""));
             }
             _ => {}
+        }
+        let force = r.numbers("actuatorfrcrange", 2..=2).ok().flatten().unwrap_or_default();
+        let says = r.get("actuatorfrclimited").unwrap_or("auto");
+        if says == "auto" && !self.c.autolimits && force.iter().any(|x| *x != 0.0) {
+            let wrong = "has actuatorfrcrange but not actuatorfrclimited, and autolimits is off: write one of the two";
+            self.fault(element, wrong);
+        }
+    }
+
+    fn tendon(&mut self, element: &Element, at: ElementPlace) {
+        let c = self.c;
+        let class = c.classes.get(element.get("class").or(at.class).unwrap_or(MAIN));
+        let r = Resolved { element, class: class.and_then(|class| class.get("tendon")) };
+        if let Some(wrong) = mjcf_values::tendon(&r, c.autolimits) {
+            self.fault(element, wrong);
         }
     }
 
@@ -248,11 +280,11 @@ impl Refusals<'_> {
     /// How many numbers a keyframe must have.
     fn keyframe(&mut self, key: &Element) {
         let count = |free: usize, ball: usize| -> usize {
-            let of = |kind: Kind| match kind {
-                Kind::Fixed => 0,
-                Kind::Free => free,
-                Kind::Other => ball,
-                Kind::Revolute | Kind::Continuous | Kind::Prismatic => 1,
+            let of = |kind: JointType| match kind {
+                JointType::Fixed => 0,
+                JointType::Free => free,
+                JointType::Other => ball,
+                JointType::Revolute | JointType::Continuous | JointType::Prismatic => 1,
             };
             self.model.joints.iter().map(|j| of(j.kind)).sum()
         };
@@ -310,8 +342,7 @@ fn own_name(element: &Element, attribute: &str, kind: &str) -> Option<String> {
 mod tests {
     use std::path::Path;
 
-    use super::super::xml;
-    use super::*;
+    use super::super::{mjcf, xml};
 
     /// The faults of point 1.
     fn faults(text: &str) -> Vec<String> {

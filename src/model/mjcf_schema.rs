@@ -46,7 +46,7 @@ struct Child {
 
 /// What the table says of an element.
 #[derive(Debug, Clone)]
-pub(super) struct Row {
+pub(super) struct ElementRule {
     tag: &'static str,
     pub(super) attributes: BTreeMap<&'static str, Attribute>,
     /// Attributes of other names pass.
@@ -54,12 +54,12 @@ pub(super) struct Row {
     children: Vec<Child>,
 }
 
-static ROWS: LazyLock<BTreeMap<&'static str, Row>> = LazyLock::new(|| {
+static ROWS: LazyLock<BTreeMap<&'static str, ElementRule>> = LazyLock::new(|| {
     let lines = TABLE.lines().filter(|l| !l.starts_with('#'));
     lines.filter_map(row).collect()
 });
 
-fn row(line: &'static str) -> Option<(&'static str, Row)> {
+fn row(line: &'static str) -> Option<(&'static str, ElementRule)> {
     let mut fields = line.split('|').map(str::trim);
     let (names, attributes, children) = (fields.next()?, fields.next()?, fields.next().unwrap_or_default());
     let (name, tag) = names.split_once('=').unwrap_or((names, names));
@@ -71,7 +71,7 @@ fn row(line: &'static str) -> Option<(&'static str, Row)> {
     };
     Some((
         name,
-        Row {
+        ElementRule {
             tag,
             attributes: words().filter(|w| *w != "*").map(attribute).collect(),
             open: words().any(|w| w == "*"),
@@ -97,18 +97,18 @@ fn attribute(word: &'static str) -> (&'static str, Attribute) {
     (name.trim_end_matches('!'), Attribute { value, required: name.ends_with('!') })
 }
 
-impl Row {
+impl ElementRule {
     /// The outermost element's.
-    pub(super) fn root() -> Option<&'static Row> {
+    pub(super) fn root() -> Option<&'static ElementRule> {
         ROWS.get("mujoco")
     }
 
-    fn child(&self, tag: &str) -> Option<(&Child, &'static Row)> {
+    fn child(&self, tag: &str) -> Option<(&Child, &'static ElementRule)> {
         self.children.iter().find_map(|c| ROWS.get(c.row).filter(|r| r.tag == tag).map(|r| (c, r)))
     }
 
     /// The row of an element in this one.
-    pub(super) fn of_child(&self, tag: &str) -> Option<&'static Row> {
+    pub(super) fn of_child(&self, tag: &str) -> Option<&'static ElementRule> {
         self.child(tag).map(|(_, row)| row)
     }
 }
@@ -122,14 +122,54 @@ pub(super) fn place(model: &Path, element: &Element) -> String {
 /// Everything in a file (with what it includes) that the format has not; at most [`MAX_FAULTS`].
 pub(super) fn violations(model: &Path, root: &Element) -> Vec<String> {
     let mut faults = Vec::new();
-    if let Some(row) = Row::root() {
+    if let Some(row) = ElementRule::root() {
         element(model, root, row, &mut faults);
     }
     faults.truncate(MAX_FAULTS);
     faults
 }
 
-fn element(model: &Path, e: &Element, row: &Row, faults: &mut Vec<String>) {
+/// Values in a URDF's `<mujoco>` that MuJoCo refuses. Attributes and elements that it does not know there it passes over.
+pub(super) fn of_urdf(model: &Path, root: &Element) -> Vec<String> {
+    let mut faults = Vec::new();
+    let Some(row) = ElementRule::root() else { return faults };
+    for mujoco in root.all("mujoco") {
+        for section in mujoco.children.iter().filter(|c| URDF_SECTIONS.contains(&c.name.as_str())) {
+            if let Some(known) = row.of_child(&section.name) {
+                values(model, section, known, &mut faults);
+            }
+        }
+    }
+    faults.truncate(MAX_FAULTS);
+    faults
+}
+
+/// What MuJoCo reads in a URDF's `<mujoco>`.
+pub(super) const URDF_SECTIONS: [&str; 3] = ["compiler", "option", "size"];
+
+/// Values of known attributes of an element and those in it.
+fn values(model: &Path, e: &Element, row: &ElementRule, faults: &mut Vec<String>) {
+    for (name, text) in &e.attributes {
+        let wrong = row.attributes.get(name.as_str()).and_then(|known| wrong_value(name, &known.value, text));
+        let wrong = wrong.or_else(|| {
+            (name == "eulerseq" && text.chars().count() != 3).then(|| "expected three of x y z X Y Z".to_owned())
+        });
+        if let Some(wrong) = wrong {
+            let at = place(model, e);
+            faults.push(format!("{at}: {name}=\"{}\": {wrong}: MuJoCo refuses the file", brief(text)));
+        }
+    }
+    if let Some(wrong) = (e.name == "size").then(|| memory(e)).flatten() {
+        faults.push(format!("{}: {wrong}: MuJoCo refuses the file", place(model, e)));
+    }
+    for child in &e.children {
+        if let Some(below) = row.of_child(&child.name) {
+            values(model, child, below, faults);
+        }
+    }
+}
+
+fn element(model: &Path, e: &Element, row: &ElementRule, faults: &mut Vec<String>) {
     if faults.len() >= MAX_FAULTS {
         return;
     }
@@ -184,8 +224,18 @@ fn element(model: &Path, e: &Element, row: &Row, faults: &mut Vec<String>) {
 pub(super) const STRAY: [&str; 2] = ["body", "frame"];
 
 /// The row of an element that is passed over.
-fn stray(parent: &Element, child: &Element) -> Option<&'static Row> {
+fn stray(parent: &Element, child: &Element) -> Option<&'static ElementRule> {
     (parent.name == "mujoco" && STRAY.contains(&child.name.as_str())).then(|| ROWS.get(child.name.as_str())).flatten()
+}
+
+/// Bodies that are lost, as they stand beside the world.
+pub(super) fn strays(path: &Path, root: &Element) -> Vec<String> {
+    let outside = root.children.iter().filter(|c| STRAY.contains(&c.name.as_str()));
+    let tell = |stray: &Element| {
+        let at = place(path, stray);
+        format!("{at}: stands outside <worldbody>, where MuJoCo passes over it without a word; move it in")
+    };
+    outside.take(MAX_FAULTS).map(tell).collect()
 }
 
 /// Ways to say how something is turned; a whole tensor turns an inertia, too.
@@ -204,6 +254,25 @@ const WHOLE: [&str; 10] = [
     "nrow",
     "ncol",
 ];
+
+/// What is wrong with a `<size>`: how large the simulation may get.
+pub(super) fn memory(e: &Element) -> Option<String> {
+    for count in ["njmax", "nconmax", "nstack"] {
+        if e.number(count).ok().flatten().is_some_and(|n| n < -1.0) {
+            return Some(format!("{count} must not be below -1"));
+        }
+    }
+    let text = e.get("memory")?;
+    if let Some(old) = ["njmax", "nstack"].into_iter().find(|a| e.get(a).is_some()) {
+        return Some(format!("has both memory and {old}, which is older: take memory alone"));
+    }
+    let trimmed = text.trim();
+    let digits = trimmed.trim_end_matches(|c: char| "KMGTPEkmgtpe".contains(c));
+    let known = trimmed == "-1" || (trimmed.len() - digits.len() <= 1 && digits.parse::<u64>().is_ok_and(|n| n > 0));
+    (!known).then(|| {
+        format!("memory=\"{}\" is no size: write a whole number of bytes, with K, M or G behind it", brief(text))
+    })
+}
 
 /// What is wrong with an attribute's text. No numbers at all count as not written.
 fn wrong_value(name: &str, value: &Value, text: &str) -> Option<String> {
@@ -231,7 +300,7 @@ mod tests {
 
     #[test]
     fn every_row_of_the_table_is_reached_and_understood() {
-        let root = Row::root().unwrap();
+        let root = ElementRule::root().unwrap();
         assert_eq!(root.children.len(), 17);
         for row in ROWS.values() {
             for child in &row.children {

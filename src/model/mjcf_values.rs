@@ -3,20 +3,35 @@
 
 use std::collections::BTreeMap;
 
+use super::links::{JointType, ModelJoint};
 use super::mjcf_context::{Class, Resolved};
-use super::mjcf_schema::Row;
+use super::mjcf_schema::{ElementRule, memory};
 use super::xml::{Element, brief};
-use super::{Kind, ModelJoint};
-use crate::math::Vector;
+use crate::math::{Vector, plain};
 
 /// MuJoCo takes an axis that is not longer for none.
-pub(super) const MIN_AXIS: f64 = 1e-14;
+pub(super) const MIN_AXIS: f64 = 1e-7;
+
+/// The plugins that come with MuJoCo 3.17; others have to be loaded by whoever opens the file.
+const PLUGINS: [&str; 8] = [
+    "mujoco.elasticity.cable",
+    "mujoco.pid",
+    "mujoco.sdf.bolt",
+    "mujoco.sdf.bowl",
+    "mujoco.sdf.gear",
+    "mujoco.sdf.nut",
+    "mujoco.sdf.torus",
+    "mujoco.sensor.touch_grid",
+];
+
+/// What `<custom>` holds of one number list at most.
+const MAX_NUMERIC: f64 = 500.0;
 
 /// A model's joints by name.
 pub(super) type Joints<'a> = BTreeMap<&'a str, &'a ModelJoint>;
 
 /// What is wrong with an element's values, in words. The same tags stand for other things in other places: its row tells.
-pub(super) fn wrong(r: &Resolved, row: &Row, joints: &Joints) -> Option<String> {
+pub(super) fn wrong(r: &Resolved, row: &ElementRule, joints: &Joints) -> Option<String> {
     let has = |attribute: &str| row.attributes.contains_key(attribute);
     let e = r.element;
     match e.name.as_str() {
@@ -27,6 +42,13 @@ pub(super) fn wrong(r: &Resolved, row: &Row, joints: &Joints) -> Option<String> 
         "joint" if has("coef") => slides_or_turns(e.get("joint"), joints),
         "weld" | "connect" => tied(e),
         "fixed" | "spatial" => path(e),
+        "inertial" if has("fullinertia") => tensors(e),
+        "size" if has("memory") => memory(e),
+        "numeric" if has("data") => numeric(e),
+        "text" if has("data") => {
+            e.get("data").is_some_and(str::is_empty).then(|| "its text is empty; write one, or leave it out".to_owned())
+        }
+        "tuple" => tuple(e),
         "texture" => texture(e),
         "material" if has("texture") => unnamed(e),
         "hfield" => height_field(e),
@@ -58,7 +80,7 @@ fn goes_up(range: &[f64]) -> bool {
 
 fn geom(r: &Resolved) -> Option<String> {
     if let Some(condim) = number(r, "condim").filter(|c| ![1.0, 3.0, 4.0, 6.0].contains(c)) {
-        return Some(format!("condim is {condim}; it is 1, 3, 4 or 6"));
+        return Some(format!("condim is {}; it is 1, 3, 4 or 6", plain(condim)));
     }
     let spacing = numbers(r, "size").get(2).copied().unwrap_or(0.0);
     (r.get("type") == Some("plane") && spacing <= 0.0).then(|| {
@@ -141,6 +163,69 @@ fn path(e: &Element) -> Option<String> {
     }
 }
 
+/// Limits of a tendon; `r` is over the tendons of its class.
+pub(super) fn tendon(r: &Resolved, autolimits: bool) -> Option<String> {
+    for (limited, range) in [("limited", "range"), ("actuatorfrclimited", "actuatorfrcrange")] {
+        let ends = numbers(r, range);
+        let says = r.get(limited).unwrap_or("auto");
+        if says == "true" && !goes_up(&ends) {
+            return Some(format!("is limited ({limited}), and has no {range} that goes up"));
+        }
+        if says == "auto" && !autolimits && ends.iter().any(|x| *x != 0.0) {
+            return Some(format!("has {range} but not {limited}, and autolimits is off: write {limited}=\"true\""));
+        }
+    }
+    if let [low, high] = numbers(r, "springlength")[..]
+        && low > high
+    {
+        return Some("the first number of springlength must not exceed the second".to_owned());
+    }
+    let width = number(r, "width").filter(|_| r.element.name == "spatial");
+    width.is_some_and(|w| w <= 0.0).then(|| "its width must be positive".to_owned())
+}
+
+/// A body's inertia, which is written in one of two ways.
+fn tensors(e: &Element) -> Option<String> {
+    let given = |attribute: &str| e.get(attribute).is_some_and(|v| !v.trim().is_empty());
+    let moments = e.numbers::<3>("diaginertia").ok().flatten().is_some_and(|m| m.iter().any(|x| *x != 0.0));
+    (given("fullinertia") && moments).then(|| "both fullinertia and diaginertia say its inertia: take one".to_owned())
+}
+
+fn numeric(e: &Element) -> Option<String> {
+    let data = e.get("data").map_or(0, |text| text.split_ascii_whitespace().count());
+    let size = e.number("size").ok().flatten();
+    if size.is_some_and(|size| (data as f64) > size) {
+        return Some("data has more numbers than size says".to_owned());
+    }
+    (!(1.0..=MAX_NUMERIC).contains(&size.unwrap_or(data as f64)))
+        .then(|| format!("holds {} numbers; it is 1 to {MAX_NUMERIC}", plain(size.unwrap_or(data as f64))))
+}
+
+fn tuple(e: &Element) -> Option<String> {
+    let mut elements = e.all("element").peekable();
+    if elements.peek().is_none() {
+        return Some("is empty: add elements".to_owned());
+    }
+    elements
+        .any(|part| part.get("objname").is_some_and(str::is_empty))
+        .then(|| "one of its elements names nothing (objname)".to_owned())
+}
+
+/// What is wrong with the name of a `<plugin>`: that none of `declared` in `<extension>` has it.
+pub(super) fn plugin(r: &Resolved, row: &ElementRule, declared: &[&str]) -> Option<String> {
+    let name = r.get("plugin").unwrap_or_default();
+    if !row.attributes.contains_key("instance") {
+        return (!PLUGINS.contains(&name)).then(|| {
+            format!("plugin \"{}\" does not come with MuJoCo: who opens the file has to load it first", brief(name))
+        });
+    }
+    if name.is_empty() {
+        let instance = r.get("instance").is_some_and(|i| !i.is_empty());
+        return (!instance).then(|| "names neither plugin nor instance".to_owned());
+    }
+    (!declared.contains(&name)).then(|| format!("no plugin \"{}\" is declared in <extension>", brief(name)))
+}
+
 /// What needs a name, as nothing else gives it one.
 fn unnamed(e: &Element) -> Option<String> {
     e.get("name").is_none_or(str::is_empty).then(|| "has no name; give it one".to_owned())
@@ -182,7 +267,7 @@ fn sensor(r: &Resolved, joints: &Joints) -> Option<String> {
     match e.name.as_str() {
         "jointpos" | "jointvel" | "jointactuatorfrc" => slides_or_turns(e.get("joint"), joints),
         "ballquat" | "ballangvel" => {
-            joint().filter(|j| j.kind != Kind::Other).map(|j| format!("\"{}\" is no ball", brief(&j.name)))
+            joint().filter(|j| j.kind != JointType::Other).map(|j| format!("\"{}\" is no ball", brief(&j.name)))
         }
         "jointlimitpos" | "jointlimitvel" | "jointlimitfrc" => joint()
             .filter(|j| j.moves().is_some() && j.limits().is_none())

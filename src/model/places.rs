@@ -2,46 +2,36 @@
 
 use std::collections::BTreeMap;
 
-use super::check::{Said, plain};
-use super::glb::{Places, SHARES, Scene};
-use super::limits::MAX_SLIDE_M;
-use super::{Model, Tree};
+use super::findings::Findings;
+use super::glb::{GltfScene, Moved, PlacesOverRange, SHARES};
+use super::joint_limits::MAX_SLIDE_M;
+use super::links::Model;
+use super::tree::Tree;
 use crate::articulation::JointKind;
-use crate::math;
+use crate::math::{self, plain, rounded};
 use crate::twin::Twin;
 
 /// A handle must be in the same place in all files to within this, metres.
 const PLACE_M: f64 = 1e-5;
 
 /// Whether a scene's animations turn pivots, as far as the joints go.
-pub(super) fn animations(scene: &Scene, twin: Option<&Twin>) -> Said {
-    let mut said = Said { concerned: true, faults: scene.faults.clone(), told: scene.told.clone(), ..Said::default() };
+pub(super) fn animations(scene: &GltfScene, twin: Option<&Twin>) -> Findings {
+    let mut said = Findings {
+        concerned: true,
+        unjudged: scene.hides_motion,
+        faults: scene.faults.clone(),
+        told: scene.told.clone(),
+    };
     if scene.moved.is_empty() && twin.is_none() {
-        let what = if scene.notes.is_empty() { "nothing in it is animated" } else { "nothing in it turns or slides" };
+        let what = match (scene.hides_motion, scene.notes.is_empty()) {
+            (true, _) => "what turns or slides in it is not read",
+            (false, true) => "nothing in it is animated",
+            (false, false) => "nothing in it turns or slides",
+        };
         said.tell(what.to_owned());
     }
     for moved in &scene.moved {
-        let name = &moved.name;
-        if !moved.is_pivot {
-            said.fault(format!(
-                "{name}: is animated and carries nothing; animate a node at the hinge with the part below it"
-            ));
-        }
-        match moved.kind {
-            JointKind::Prismatic if moved.reaches > MAX_SLIDE_M => {
-                said.fault(format!("{name}: its animation slides it by {} m; glTF is in metres", plain(moved.reaches)));
-            }
-            JointKind::Revolute if moved.reaches > std::f64::consts::TAU + 1e-6 => {
-                let degrees = moved.reaches.to_degrees();
-                said.fault(format!("{name}: its animation turns it by {degrees:.0}°, more than once around"));
-            }
-            _ => {}
-        }
-        if let Some(upper) = moved.upper
-            && (moved.reaches - upper).abs() > 1e-3
-        {
-            said.fault(format!("{name}: its animation opens to {:.4}, its limit is {upper:.4}", moved.reaches));
-        }
+        animation(&mut said, moved);
     }
     if scene.is_physics {
         if let Some(moved) = scene.moved.first() {
@@ -67,9 +57,35 @@ pub(super) fn animations(scene: &Scene, twin: Option<&Twin>) -> Said {
     said
 }
 
+/// Whether an animation turns a pivot, in the right unit and as far as its joint goes.
+fn animation(said: &mut Findings, moved: &Moved) {
+    let name = &moved.name;
+    if !moved.is_pivot {
+        said.fault(format!(
+            "{name}: is animated and carries nothing; animate a node at the hinge with the part below it"
+        ));
+    }
+    match moved.kind {
+        JointKind::Prismatic if moved.reaches > MAX_SLIDE_M => {
+            said.fault(format!("{name}: its animation slides it by {} m; glTF is in metres", plain(moved.reaches)));
+        }
+        JointKind::Revolute if moved.reaches > std::f64::consts::TAU + 1e-6 => {
+            let degrees = rounded(moved.reaches.to_degrees(), 0);
+            said.fault(format!("{name}: its animation turns it by {degrees}°, more than once around"));
+        }
+        _ => {}
+    }
+    if let Some(upper) = moved.upper
+        && (moved.reaches - upper).abs() > 1e-3
+    {
+        let [reaches, upper] = [moved.reaches, upper].map(|x| rounded(x, 4));
+        said.fault(format!("{name}: its animation opens to {reaches}, its limit is {upper}"));
+    }
+}
+
 /// Where links, named shapes and sites of each moving part are; every other joint is closed. World, metres.
 #[must_use]
-pub fn places(model: &Model, tree: &Tree) -> BTreeMap<String, Places> {
+pub fn places(model: &Model, tree: &Tree) -> BTreeMap<String, PlacesOverRange> {
     let closed = model.closed();
     let mut out = BTreeMap::new();
     for (index, joint) in model.moving() {
@@ -92,8 +108,8 @@ pub fn places(model: &Model, tree: &Tree) -> BTreeMap<String, Places> {
 }
 
 /// Whether handles and boxes are where the twin has them: closed, half open, open.
-pub(super) fn same_places(twin: &Twin, read: &BTreeMap<String, Places>) -> Said {
-    let mut said = Said::about(!twin.furniture.is_empty());
+pub(super) fn same_places(twin: &Twin, read: &BTreeMap<String, PlacesOverRange>) -> Findings {
+    let mut said = Findings::about(!twin.furniture.is_empty());
     for part in twin.furniture.iter().map(|f| &f.part) {
         let joint = &part.joint;
         let handle = format!("{}_handle", part.id);

@@ -2,10 +2,11 @@
 
 use serde_json::Value;
 
-use super::check::{Said, plain};
+use super::findings::Findings;
 use super::gltf_file::{index, list};
-use super::limits::MAX_SLIDE_M;
+use super::joint_limits::MAX_SLIDE_M;
 use super::xml;
+use crate::math::plain;
 
 /// The extension with bodies and joints.
 pub(super) const NAME: &str = "KHR_physics_rigid_bodies";
@@ -68,8 +69,8 @@ fn limits_of(limit: &Value) -> Vec<PhysicsLimit> {
 }
 
 /// The second point, for joints of glTF.
-pub(super) fn limits(joints: &[PhysicsJoint]) -> Said {
-    let mut said = Said::about(!joints.is_empty());
+pub(super) fn limits(joints: &[PhysicsJoint]) -> Findings {
+    let mut said = Findings::about(!joints.is_empty());
     for joint in joints {
         let name = &joint.name;
         let limits = match &joint.limits {
@@ -96,7 +97,7 @@ pub(super) fn limits(joints: &[PhysicsJoint]) -> Said {
     said
 }
 
-fn ends(said: &mut Said, name: &str, limit: &PhysicsLimit) {
+fn ends(said: &mut Findings, name: &str, limit: &PhysicsLimit) {
     if limit.axes.iter().any(|a| *a > 2) {
         said.fault(format!("{name}: limits an axis that is none of 0, 1, 2"));
     }

@@ -1,19 +1,20 @@
 //! URDF. Read from the XML itself, because what is missing must stay missing: `urdf-rs` turns an absent limit into one of
-//! 0 and an absent inertia into no mass. Whether `urdf-rs` reads the file too is kept as [`Format::Urdf`]'s `complaint`.
+//! 0 and an absent inertia into no mass. Whether `urdf-rs` reads the file too is kept as [`ModelFormat::Urdf`]'s `complaint`.
 //!
 //! Read: links with inertia, boxes, cylinders, spheres, capsules and OBJ or STL meshes; joints with origin, axis, limit,
 //! dynamics. A `<limit>` with one of `lower` and `upper` has 0 for the other, as the format says. What MuJoCo, PyBullet or
-//! others refuse though it can be read is kept as [`Format::Urdf`]'s `faults`. Listed as not read: `mimic`, `safety_controller`, `transmission`, `gazebo` and other additions.
+//! others refuse though it can be read is kept as [`ModelFormat::Urdf`]'s `faults`. Listed as not read: `mimic`, `safety_controller`, `transmission`, `gazebo` and other additions.
 
 use std::path::Path;
 
-use nalgebra::{Matrix3, Quaternion, UnitQuaternion};
+use nalgebra::Matrix3;
 
-use super::urdf_geometry::{Compiler, Geometry};
+use super::links::{JointType, Link, MassSource, Model, ModelFormat, ModelJoint, WORLD, bounded, named};
+use super::urdf_geometry::{Compiler, Geometry, pose};
 use super::xml::{self, Element};
-use super::{Format, Kind, Link, MassSource, Model, ModelJoint, bounded, mjcf_values, named, weights};
+use super::{angles, mjcf_schema, mjcf_values, urdf_names, weights};
 use crate::error::{Error, Result};
-use crate::math::{Point, Pose, Vector};
+use crate::math::{Point, Vector};
 
 /// Reads a file.
 ///
@@ -26,6 +27,50 @@ pub fn read(path: &Path) -> Result<Model> {
 }
 
 pub(super) fn from_element(path: &Path, text: &str, root: &Element) -> Result<Model> {
+    expanded(path, root)?;
+    let compiler = Compiler::of(root);
+    let keeps_links = compiler.keeps_links && compiler.keeps_visuals;
+    let fuses = !compiler.keeps_links;
+    let mended = compiler.mended;
+    let complaint = urdf_rs::read_from_string(text).err().map(|e| one_line(&e.to_string()));
+    let mut geometry = Geometry::new(path, compiler);
+    let mut model = Model {
+        name: named(root.get("name"), path),
+        source: path.to_owned(),
+        format: ModelFormat::Urdf { keeps_links, complaint, faults: Vec::new() },
+        links: Vec::new(),
+        joints: Vec::new(),
+        excludes: Vec::new(),
+        notes: Vec::new(),
+        unread: Vec::new(),
+        held: Vec::new(),
+        faults: Vec::new(),
+    };
+    let mimics = contents(root, &mut model, &mut geometry)?;
+    if model.links.is_empty() {
+        return Err(Error::format(path, root.label(), "holds no <link>"));
+    }
+    bounded(&model)?;
+    geometry.finish();
+    let Geometry { faults: mut found, notes, .. } = geometry;
+    model.notes.extend(notes);
+    once(root, &["mujoco"], &mut found);
+    root.all("mujoco").for_each(|m| once(m, &mjcf_schema::URDF_SECTIONS, &mut found));
+    found.extend(mjcf_schema::of_urdf(path, root));
+    found.extend(urdf_names::undefined(root));
+    found.extend(mimicked(&model, &mimics));
+    found.extend(floating(&model, fuses));
+    found.extend(without_axis(&model));
+    found.extend(weights::refused(&model, mended));
+    model.faults.extend(angles::of_urdf(root).into_iter().map(|fault| (5, fault)));
+    if let ModelFormat::Urdf { faults, .. } = &mut model.format {
+        *faults = found;
+    }
+    Ok(model)
+}
+
+/// Refuses what is no URDF, or only becomes one.
+fn expanded(path: &Path, root: &Element) -> Result<()> {
     if root.name != "robot" {
         return Err(root.error("expected <robot>, the outermost element of a URDF"));
     }
@@ -35,30 +80,15 @@ pub(super) fn from_element(path: &Path, text: &str, root: &Element) -> Result<Mo
             path.file_name().map_or_else(|| "FILE".to_owned(), |n| n.to_string_lossy().into_owned())
         )));
     }
-    let compiler = Compiler::of(root);
-    let keeps_links = compiler.keeps_links && compiler.keeps_visuals;
-    let fuses = !compiler.keeps_links;
-    let mended = compiler.mended;
-    let complaint = urdf_rs::read_from_string(text).err().map(|e| one_line(&e.to_string()));
-    let mut geometry = Geometry::new(path, compiler);
+    Ok(())
+}
+
+/// Reads the elements right in `<robot>`. Gives the joints that follow others, by name: the follower first.
+fn contents(root: &Element, model: &mut Model, geometry: &mut Geometry) -> Result<Vec<(String, String)>> {
     let mut mimics = Vec::new();
-    let mut model = Model {
-        name: named(root.get("name"), path),
-        source: path.to_owned(),
-        format: Format::Urdf { keeps_links, complaint, faults: Vec::new() },
-        links: Vec::new(),
-        joints: Vec::new(),
-        excludes: Vec::new(),
-        notes: Vec::new(),
-        unread: Vec::new(),
-        faults: Vec::new(),
-    };
     for child in &root.children {
         match child.name.as_str() {
-            "link" => {
-                let link = link(child, &mut geometry)?;
-                model.links.push(link);
-            }
+            "link" => model.links.push(link(child, geometry)?),
             "joint" => {
                 once(child, &JOINT_HAS_ONE, &mut geometry.faults);
                 let joint = joint(child, &mut model.notes)?;
@@ -76,21 +106,7 @@ pub(super) fn from_element(path: &Path, text: &str, root: &Element) -> Result<Mo
             other => model.notes.push(format!("<{}> (line {}) is not read", xml::brief(other), child.line)),
         }
     }
-    if model.links.is_empty() {
-        return Err(Error::format(path, root.label(), "holds no <link>"));
-    }
-    bounded(&model)?;
-    geometry.finish();
-    let Geometry { faults: mut found, notes, .. } = geometry;
-    model.notes.extend(notes);
-    found.extend(mimicked(&model, &mimics));
-    found.extend(floating(&model, fuses));
-    found.extend(without_axis(&model));
-    found.extend(weights::refused(&model, mended));
-    if let Format::Urdf { faults, .. } = &mut model.format {
-        *faults = found;
-    }
-    Ok(model)
+    Ok(mimics)
 }
 
 /// A message as one line, whole unless it quotes half a file.
@@ -140,13 +156,13 @@ fn floating(model: &Model, fuses: bool) -> Vec<String> {
     let Ok(tree) = model.tree() else { return Vec::new() };
     let Some(root) = tree.order.first().copied() else { return Vec::new() };
     let in_world = |link: usize| {
-        let is_world = link == root && model.links[root].name == super::mjcf::WORLD;
+        let is_world = link == root && model.links[root].name == WORLD;
         is_world || (fuses && tree.body[link] == tree.body[root])
     };
     let hangs = |link: usize| {
         let joint = &model.joints[tree.carrier[link]?];
         let parent = tree.parent[link]?;
-        (joint.kind == Kind::Free && !in_world(parent)).then(|| {
+        (joint.kind == JointType::Free && !in_world(parent)).then(|| {
             format!(
                 "{}: floats on {}, which is not the world: MuJoCo refuses the file, PyBullet fixes it",
                 joint.name, joint.parent
@@ -169,22 +185,6 @@ fn xacro(element: &Element) -> Option<&Element> {
         return Some(element);
     }
     element.children.iter().find_map(xacro)
-}
-
-/// `parent_from_element`, from its `<origin>`.
-pub(super) fn pose(parent: &Element) -> Result<Pose> {
-    let Some(origin) = parent.child("origin") else { return Ok(Pose::identity()) };
-    let xyz = origin.numbers::<3>("xyz")?.unwrap_or_default();
-    let turn = match (origin.numbers::<3>("rpy")?, origin.numbers::<4>("quat_xyzw")?) {
-        (None, Some([x, y, z, w])) => {
-            UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-6).ok_or_else(|| origin.error("quat_xyzw is 0"))?
-        }
-        (rpy, _) => {
-            let [roll, pitch, yaw] = rpy.unwrap_or_default();
-            UnitQuaternion::from_euler_angles(roll, pitch, yaw)
-        }
-    };
-    Ok(Pose::from_parts(Vector::from(xyz).into(), turn))
 }
 
 fn link(element: &Element, geometry: &mut Geometry) -> Result<Link> {
@@ -219,12 +219,12 @@ fn link(element: &Element, geometry: &mut Geometry) -> Result<Link> {
 fn joint(element: &Element, notes: &mut Vec<String>) -> Result<ModelJoint> {
     let name = element.own_name()?;
     let kind = match element.get("type") {
-        Some("fixed") => Kind::Fixed,
-        Some("revolute") => Kind::Revolute,
-        Some("continuous") => Kind::Continuous,
-        Some("prismatic") => Kind::Prismatic,
-        Some("floating") => Kind::Free,
-        Some("planar" | "spherical" | "ball") => Kind::Other,
+        Some("fixed") => JointType::Fixed,
+        Some("revolute") => JointType::Revolute,
+        Some("continuous") => JointType::Continuous,
+        Some("prismatic") => JointType::Prismatic,
+        Some("floating") => JointType::Free,
+        Some("planar" | "spherical" | "ball") => JointType::Other,
         Some(other) => return Err(element.error(format!("\"{}\" is no joint type of URDF", xml::brief(other)))),
         None => return Err(element.error("has no type")),
     };
@@ -238,12 +238,12 @@ fn joint(element: &Element, notes: &mut Vec<String>) -> Result<ModelJoint> {
     };
     let axis = element.child("axis").map(|a| a.numbers::<3>("xyz")).transpose()?.flatten().unwrap_or([1.0, 0.0, 0.0]);
     let (mut lower, mut upper) = (of("limit", "lower")?, of("limit", "upper")?);
-    if kind == Kind::Continuous {
+    if kind == JointType::Continuous {
         (lower, upper) = (None, None);
     } else if lower.is_some() || upper.is_some() {
         (lower, upper) = (lower.or(Some(0.0)), upper.or(Some(0.0)));
     }
-    if kind == Kind::Other {
+    if kind == JointType::Other {
         let what = element.get("type").unwrap_or_default();
         notes.push(format!("{name}: {what} joints are not judged: only hinges and slides are"));
     }
@@ -291,7 +291,7 @@ mod tests {
         let j = &m.joints[0];
         assert_eq!((j.lower, j.upper, j.effort, j.velocity, j.damping), (Some(0.0), Some(1.0), Some(3.0), None, None));
         assert_eq!((m.links[1].mass, m.links[1].shapes[0].bounds.half), (None, Vector::new(1.0, 2.0, 3.0)));
-        assert!(matches!(&m.format, Format::Urdf { keeps_links: false, complaint: Some(_), .. }));
+        assert!(matches!(&m.format, ModelFormat::Urdf { keeps_links: false, complaint: Some(_), .. }));
     }
 
     #[test]

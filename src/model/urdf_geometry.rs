@@ -5,13 +5,16 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::mesh::{self, Measured};
+use nalgebra::{Quaternion, UnitQuaternion};
+
+use super::links::{Link, Shape};
+use super::mesh_files::{self, MeshMeasures};
 use super::shapes::Primitive;
 use super::weights::Mended;
 use super::xml::{self, Element};
-use super::{Link, Shape, kinds};
+use super::{kinds, png_files};
 use crate::error::Result;
-use crate::math::Vector;
+use crate::math::{Pose, Vector};
 
 /// Nothing that is built is larger, metres; beyond, products of sizes leave what numbers hold.
 const MAX_SIZE_M: f64 = 1e6;
@@ -51,12 +54,28 @@ impl Compiler {
     }
 }
 
+/// `parent_from_element`, from its `<origin>`.
+pub(super) fn pose(parent: &Element) -> Result<Pose> {
+    let Some(origin) = parent.child("origin") else { return Ok(Pose::identity()) };
+    let xyz = origin.numbers::<3>("xyz")?.unwrap_or_default();
+    let turn = match (origin.numbers::<3>("rpy")?, origin.numbers::<4>("quat_xyzw")?) {
+        (None, Some([x, y, z, w])) => {
+            UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-6).ok_or_else(|| origin.error("quat_xyzw is 0"))?
+        }
+        (rpy, _) => {
+            let [roll, pitch, yaw] = rpy.unwrap_or_default();
+            UnitQuaternion::from_euler_angles(roll, pitch, yaw)
+        }
+    };
+    Ok(Pose::from_parts(Vector::from(xyz).into(), turn))
+}
+
 /// Reads shapes, and keeps what is wrong with them.
 pub(super) struct Geometry<'a> {
     path: &'a Path,
     compiler: Compiler,
     /// A file that many shapes show is read once.
-    measured: BTreeMap<PathBuf, Measured>,
+    measured: BTreeMap<PathBuf, MeshMeasures>,
     /// Meshes that are there, and that MuJoCo does not find by how they are written.
     unfound: Vec<String>,
     /// What simulators refuse, and which.
@@ -79,7 +98,7 @@ impl<'a> Geometry<'a> {
         if let Some(file) = element.child("material").and_then(|m| m.child("texture")).and_then(|t| t.get("filename")) {
             self.texture(&link.name, file);
         }
-        let pose = super::urdf::pose(element)?;
+        let pose = pose(element)?;
         let primitive = match element.child("geometry").and_then(|g| g.children.first()) {
             Some(solid) if solid.name == "mesh" => self.mesh(link, solid, visual)?,
             Some(solid) => self.primitive(&link.name, solid, visual)?,
@@ -96,6 +115,7 @@ impl<'a> Geometry<'a> {
             name: element.get("name").map(str::to_owned),
             bounds: primitive.bounds(&pose),
             exact: primitive.is_box(),
+            is_mesh: matches!(primitive, Primitive::Mesh(_)),
             visual,
             masks: [1, 1],
         });
@@ -198,7 +218,7 @@ impl<'a> Geometry<'a> {
     }
 
     /// A mesh's file, measured; `None`, and a fault, where there is none.
-    fn of_file(&mut self, link: &str, file: &str, visual: bool) -> Option<Measured> {
+    fn of_file(&mut self, link: &str, file: &str, visual: bool) -> Option<MeshMeasures> {
         let shown = xml::brief(file);
         let mujoco = self.mujoco_reads(visual);
         let slashes = file.replace('\\', "/");
@@ -208,14 +228,14 @@ impl<'a> Geometry<'a> {
         let own = folder.join(written);
         let found = if own.is_file() {
             own
-        } else if let Some(found) = mesh::find(self.path, &[PathBuf::from(&self.compiler.mesh_dir)], &slashes) {
+        } else if let Some(found) = mesh_files::find(self.path, &[PathBuf::from(&self.compiler.mesh_dir)], &slashes) {
             if mujoco {
                 self.unfound.push(shown.clone());
             }
             found
         } else {
             let who = if mujoco { "MuJoCo and PyBullet refuse" } else { "PyBullet refuses" };
-            let near = mesh::other_case(&own)
+            let near = mesh_files::other_case(&own)
                 .map_or_else(String::new, |n| format!("; there is {}, and capitals count", xml::brief(&n)));
             self.faults.push(format!("{link}: mesh {shown} is not there: {who} the file{near}"));
             return None;
@@ -223,9 +243,10 @@ impl<'a> Geometry<'a> {
         if file.contains('\\') {
             self.faults.push(format!("{link}: mesh {shown} has a backslash: PyBullet and others find it only with /"));
         }
-        let measured = self.measured.entry(found).or_insert_with_key(|found| mesh::measured(found)).clone();
-        let flat = measured.flat.then(|| mesh::FLAT.to_owned());
-        match measured.refused.as_ref().or(measured.hollow.as_ref()).or(flat.as_ref()) {
+        let measured = self.measured.entry(found).or_insert_with_key(|found| mesh_files::measured(found)).clone();
+        let flat = measured.flat.then(|| mesh_files::FLAT.to_owned());
+        let broken = measured.faces.as_ref().or(measured.hollow.as_ref());
+        match measured.refused.as_ref().or(broken).or(flat.as_ref()) {
             Some(why) if mujoco => self.faults.push(format!("{link}: mesh {shown} {why}: MuJoCo refuses the file")),
             _ => {}
         }
@@ -234,9 +255,13 @@ impl<'a> Geometry<'a> {
 
     /// Looks for a picture.
     pub fn texture(&mut self, owner: &str, file: &str) {
-        let what = match mesh::find(self.path, &[], &file.replace('\\', "/")) {
+        let what = match mesh_files::find(self.path, &[], &file.replace('\\', "/")) {
             None => "is not there",
             Some(found) if kinds::is_pointer(&kinds::head(&found)) => "is a Git LFS pointer (run `git lfs pull`)",
+            Some(found) if found.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) => {
+                let Some(why) = png_files::broken_png(&found) else { return };
+                why
+            }
             Some(_) => return,
         };
         let shown = xml::brief(file);

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::{Format, Kind, Link, MassSource, Model};
+use super::links::{JointType, Link, MassSource, Model, ModelFormat};
 
 /// What a file's `<compiler>` mends by itself.
 #[derive(Debug, Clone, Copy, Default)]
@@ -52,7 +52,7 @@ fn tensor(model: &Model, link: &Link, mended: Mended) -> Option<String> {
     let [a, b, c] = moments(link).filter(|_| link.inertia.iter().any(|x| *x != 0.0))?;
     // A URDF gives whole tensors; an MJCF's moments may be 0 one by one in what stands still.
     let least = match model.format {
-        Format::Urdf { .. } if !mended.bounded => MIN_MOMENT,
+        ModelFormat::Urdf { .. } if !mended.bounded => MIN_MOMENT,
         _ => -MIN_MOMENT,
     };
     let name = &link.name;
@@ -79,7 +79,7 @@ fn weightless(model: &Model, told: &BTreeSet<usize>, faults: &mut Vec<String>) {
         weighs[*body] |= told.contains(&i) || has_weight(model, link);
     }
     for (i, link) in links.iter().enumerate() {
-        let moves = tree.carrier[i].is_some_and(|joint| model.joints[joint].kind != Kind::Fixed);
+        let moves = tree.carrier[i].is_some_and(|joint| model.joints[joint].kind != JointType::Fixed);
         if moves && !link.between && !weighs[tree.body[i]] {
             faults.push(format!(
                 "{}: moves, and neither it nor what is fixed to it has mass and inertia: MuJoCo refuses it; write \
@@ -94,7 +94,7 @@ fn weightless(model: &Model, told: &BTreeSet<usize>, faults: &mut Vec<String>) {
 fn has_weight(model: &Model, link: &Link) -> bool {
     match (link.mass_source, link.mass) {
         // Of a URDF's link without <inertial> the colliding shapes weigh as much as water.
-        (MassSource::Nothing, _) if matches!(model.format, Format::Urdf { .. }) => {
+        (MassSource::Nothing, _) if matches!(model.format, ModelFormat::Urdf { .. }) => {
             link.collides_as_mesh || link.incomplete || link.shapes.iter().any(|s| !s.visual)
         }
         (MassSource::Nothing, _) | (MassSource::Stated, None) => false,
@@ -127,8 +127,8 @@ mod tests {
         let path = Path::new("m.urdf");
         let model = urdf::from_element(path, &text, &xml::parse(path, &text).unwrap()).unwrap();
         match model.format {
-            Format::Urdf { faults, .. } => faults,
-            Format::Mjcf { .. } => Vec::new(),
+            ModelFormat::Urdf { faults, .. } => faults,
+            ModelFormat::Mjcf { .. } => Vec::new(),
         }
     }
 

@@ -2,29 +2,31 @@
 
 use std::collections::BTreeMap;
 
-use super::ClipResult;
+use super::{ClipResult, weigh};
 use crate::articulation::Outcome;
 use crate::config::{Config, InferenceMethod, LineMethod};
 use crate::error::Result;
 use crate::geometry::Rect;
-use crate::geometry::outline::Stop;
 use crate::geometry::segments::LiftedSegment;
-use crate::geometry::{Face, LineTrack, ManhattanFrame, candidates, face, moved, outline, sights, tracks};
+use crate::geometry::{Face, LineTrack, ManhattanFrame, candidates, face, tracks};
 use crate::hands::contact::Hold;
 use crate::hands::{self, Trajectory};
 use crate::inference;
 use crate::localization::{self, Footage, Region, views};
-use crate::math::Point;
+use crate::math::{Point, Vector, signed_angle};
+use crate::part::outline;
+use crate::part::outline::Stop;
+use crate::part::views as open_state;
 use crate::reasoning::words::{Sight, Words};
-use crate::reasoning::{self, PartShape, Question, Reasoner};
+use crate::reasoning::{self, PartShape, Reasoner};
 use crate::recording::narration::{self, Reading};
 use crate::recording::{AtWork, Clip, Recording};
 
 /// A clip after its hand was followed.
 pub(super) struct Followed {
-    reading: Reading,
+    pub(super) reading: Reading,
     /// The hand, or the reason why there is none.
-    hand: Outcome<Trajectory>,
+    pub(super) hand: Outcome<Trajectory>,
     /// Frames in which the furniture is closed.
     pub(super) closed: Vec<usize>,
     /// Frames in which it is open.
@@ -45,7 +47,7 @@ pub(super) fn follow(
         hands::trajectory(recording, clip, &reading, hold, &config.hands)
     };
     let (closed, open) = hand.found().map_or_else(Default::default, |t| {
-        let open = moved::open_frames(recording, clip, t).into_iter().map(|f| f.frame).collect();
+        let open = open_state::open_frames(recording, clip, t, &config.part).into_iter().map(|f| f.frame).collect();
         (localization::local_frames(recording, clip, t, at_work, &config.localization), open)
     });
     Followed { reading, hand, closed, open }
@@ -142,16 +144,16 @@ pub(super) fn infer(
         viewpoint: region.viewpoint,
         manhattan: seen.room,
         lines: &result.lines,
-        up: upward(recording, seen.room),
-        level: narration::level_share(furniture, located.reading.strength() * config.reasoning.name_accuracy),
+        up: upward(recording, seen.room, config),
+        level: config.priors.hung.level_share(furniture, located.reading.strength() * config.reasoning.name_accuracy),
     };
-    result.face = face::fit(&around, &config.geometry, config.seed);
+    result.face = face::fit(&around, &config.geometry, &config.priors, config.seed);
 
     let path = trajectory.positions();
-    let open = moved::open_views(recording, sketches, clip, trajectory);
-    let stops = result.face.as_ref().map_or_else(Vec::new, |f| edges_on(f, &result.lines));
+    let open = open_state::open_views(recording, sketches, clip, trajectory, &config.part);
+    let stops = result.face.as_ref().map_or_else(Vec::new, |f| edges_on(f, &result.lines, config));
     if let Some(face) = &result.face {
-        result.part = outline::vote(face, &surface, &open, None, &config.fitting).moving_rect(&stops);
+        result.part = outline::vote(face, &surface, &open, None, config).moving_rect(&stops);
     }
     result.candidates = candidates::collect(
         &candidates::Evidence {
@@ -167,29 +169,22 @@ pub(super) fn infer(
         },
         &config.inference,
     );
-    let paths = [path.clone()];
     if config.inference.method == InferenceMethod::Posterior {
-        result.candidates =
-            result.candidates.iter().map(|c| candidates::settled(c, &paths, &config.reasoning)).collect();
+        result.candidates = weigh::settled(&result.candidates, std::slice::from_ref(&path), config);
     }
-    let sights_of_part = result.face.as_ref().map(|face| sights::Sights::of(face, result.part.as_ref(), &open));
     let grip_std_m = hands::grip_std_m(trajectory.closed_end_seen());
-    let joints = result.candidates.iter().map(|c| &c.joint);
-    let agreement = match &sights_of_part {
-        Some(sights) => sights::agreements(sights, joints, &region.grip, grip_std_m),
-        None => vec![0.0; result.candidates.len()],
-    };
-    let answer = reasoner.answer(&Question {
-        reading: &located.reading,
+    let closed = result.face.map(|face| weigh::ClosedFront { face, rect: result.part, grip: region.grip, grip_std_m });
+    let shown = weigh::ClipEvidence {
+        reading: located.reading.clone(),
         words: result.words.as_ref(),
-        path: &path,
-        grip: region.grip,
-        candidates: &result.candidates,
-        agreement: &agreement,
-        part: result.part.as_ref().map(part_shape),
-        face: result.face.as_ref(),
-        up: recording.up(),
-    });
+        path,
+        open: open.clone(),
+        closed: closed.into_iter().collect(),
+    };
+    let part =
+        weigh::AskedPart { grip: region.grip, face: result.face.as_ref(), shape: result.part.as_ref().map(part_shape) };
+    let mut answers = weigh::answers(&[shown], &part, &result.candidates, recording, reasoner, config);
+    let Some(answer) = answers.pop() else { return Ok(result) };
     let face = result.face.as_ref();
     result.joint = match config.inference.method {
         InferenceMethod::Paper => {
@@ -212,8 +207,8 @@ pub(super) fn infer(
             face,
             &surface,
             &open,
-            Some((&joint.joint, &moved::told(&joint.joint, &region.grip, &open))),
-            &config.fitting,
+            Some((&joint.joint, &open_state::told(&joint.joint, &region.grip, &open))),
+            config,
         );
         result.part = votes.moving_rect(&stops).or(result.part);
     }
@@ -222,9 +217,9 @@ pub(super) fn infer(
 }
 
 /// Up, as the room's own upright edges have it where they are near the world's (which may be off by a degree).
-pub(super) fn upward(recording: &Recording, room: Option<&ManhattanFrame>) -> crate::math::Vector {
-    let up = recording.up();
-    room.map(|r| r.axes[2]).filter(|axis| crate::math::signed_angle(axis, &up) < 5f64.to_radians()).unwrap_or(up)
+pub(super) fn upward(recording: &Recording, room: Option<&ManhattanFrame>, config: &Config) -> Vector {
+    let (up, near) = (recording.up(), config.geometry.frame.up_deg.to_radians());
+    room.map(|r| r.axes[2]).filter(|axis| signed_angle(axis, &up) < near).unwrap_or(up)
 }
 
 /// Points of the touched furniture: of the local frames, and of the global views where masks tell what belongs to it.
@@ -238,15 +233,16 @@ pub(super) fn surface(footage: &Footage, region: &Region, views: &[usize], confi
 }
 
 /// Lines on a face that run along one of its axes.
-pub(super) fn edges_on(face: &Face, lines: &[LineTrack]) -> Vec<Stop> {
+pub(super) fn edges_on(face: &Face, lines: &[LineTrack], config: &Config) -> Vec<Stop> {
+    let rules = &config.geometry.face;
     lines
         .iter()
         .filter_map(|line| {
             let [a, b] = line.segment.ends().map(|p| face.coordinates(&p));
-            let near = a[2].abs() < 0.05 && b[2].abs() < 0.05;
+            let near = [a, b].iter().all(|end| end[2].abs() < rules.edges_within_m);
             let along = line.segment.line.direction;
-            let upright = along.dot(&face.up).abs() > 0.98;
-            let level = along.dot(&face.right).abs() > 0.98;
+            let upright = along.dot(&face.up).abs() > rules.edges_along_cos;
+            let level = along.dot(&face.right).abs() > rules.edges_along_cos;
             if !near || !(upright || level) {
                 return None;
             }

@@ -1,13 +1,10 @@
 //! Which of a part's clips saw it closed best: the one that gives its front (ours).
 
 use super::ClipResult;
-use crate::config::{Config, InferenceMethod};
+use crate::config::{ClosedFronts, Config, InferenceMethod};
 use crate::geometry::Face;
 use crate::hands;
 use crate::math::{Point, signed_angle};
-
-/// What parts open, standard deviation, metres: so far before its front a hand of another clip may have been lost.
-const TRAVEL_M: f64 = 0.3;
 
 /// A hand at the closed end of its motion.
 #[derive(Clone, Copy)]
@@ -39,43 +36,44 @@ fn trust(clips: &[ClipResult], clip: usize, grips: &[Grip], config: &Config) -> 
     let (Some(face), Some(own)) = (&clips[clip].face, Grip::of(clips, clip)) else {
         return f64::NEG_INFINITY;
     };
-    let off = |grip: &Grip| face.coordinates(&grip.at)[2] - config.geometry.grip_standoff_m;
-    let moved = if clips[clip].part.is_some() { 2.0 } else { 1.0 };
+    let (rules, handles) = (&config.inference.closed, &config.priors.handles);
+    let handle = AtHandle { std_m: handles.standoff_std_m, rules };
+    let off = |grip: &Grip| face.coordinates(&grip.at)[2] - handles.standoff_m;
+    let moved = if clips[clip].part.is_some() { rules.moved } else { 1.0 };
     match config.inference.method {
-        InferenceMethod::Paper => (at_handle(off(&own)) * (0.2 + face.support) * moved).ln(),
+        InferenceMethod::Paper => (handle.near(off(&own)) * (rules.thin_support + face.support) * moved).ln(),
         InferenceMethod::Posterior => {
             // The face was looked for near its own hand.
-            let lost_m = |grip: &Grip| if grip.clip == clip { hands::grip_std_m(false) } else { TRAVEL_M };
-            let borne_out: f64 = grips.iter().map(|g| at_front(off(g), g.seen, lost_m(g)).ln()).sum();
+            let lost_m = |grip: &Grip| if grip.clip == clip { hands::grip_std_m(false) } else { rules.travel_m };
+            let borne_out: f64 = grips.iter().map(|g| handle.at_front(off(g), g.seen, lost_m(g)).ln()).sum();
             // A front is most of what is seen around a hand that holds it: half the support counts a quarter.
             borne_out + (face.support.powi(2) * moved / own.std_m()).ln()
         }
     }
 }
 
-/// Standard deviation of how far hands that hold closed parts are from where handles usually stand off their fronts, metres: of
-/// handles, and of hands.
-fn at_handle_std_m() -> f64 {
-    const HANDLES_M: f64 = 0.04;
-    HANDLES_M.hypot(hands::grip_std_m(true))
+/// Where hands that hold closed parts are.
+struct AtHandle<'a> {
+    /// Standard deviation of how far they are from where handles usually stand off their fronts, metres: of handles, and of hands.
+    std_m: f64,
+    rules: &'a ClosedFronts,
 }
 
-/// How likely such a distance is against none.
-fn at_handle(off: f64) -> f64 {
-    (-0.5 * (off / at_handle_std_m()).powi(2)).exp()
-}
+impl AtHandle<'_> {
+    /// How likely such a distance is against none.
+    fn near(&self, off: f64) -> f64 {
+        (-0.5 * (off / self.std_m).powi(2)).exp()
+    }
 
-/// The same of any hand at the closed end of its motion, where it was or was not `seen` to take hold or let go. Behind its front
-/// there is no hand. A lost one may be before it by a standard deviation of `lost_m`, metres, and so may one of five that seemed
-/// to be seen, as flags of contacts are wrong, too.
-fn at_front(off: f64, seen: bool, lost_m: f64) -> f64 {
-    const WRONG: f64 = 0.2;
-    /// Hands of other parts, wrong depth: anywhere within a metre.
-    const ODD: f64 = 0.02;
-    let near = at_handle_std_m();
-    let bell = if off > 0.0 { (-0.5 * (off / lost_m).powi(2)).exp() } else { at_handle(off) };
-    let lost = 2.0 * near / (near + lost_m) * bell;
-    ODD * near + if seen { (1.0 - WRONG) * at_handle(off) + WRONG * lost } else { lost }
+    /// The same of any hand at the closed end of its motion, where it was or was not `seen` to take hold or let go. Behind its
+    /// front there is no hand. A lost one may be before it by a standard deviation of `lost_m`, metres, and so may some that
+    /// seemed to be seen, as flags of contacts are wrong, too.
+    fn at_front(&self, off: f64, seen: bool, lost_m: f64) -> f64 {
+        let (near, wrong) = (self.std_m, self.rules.wrong_flags);
+        let bell = if off > 0.0 { (-0.5 * (off / lost_m).powi(2)).exp() } else { self.near(off) };
+        let lost = 2.0 * near / (near + lost_m) * bell;
+        self.rules.odd * near + if seen { (1.0 - wrong) * self.near(off) + wrong * lost } else { lost }
+    }
 }
 
 /// A part's clips with an answer, the one that saw it closed best first.
@@ -89,11 +87,11 @@ pub(super) fn by_trust(clips: &[ClipResult], members: &[usize], config: &Config)
 
 /// Of the clips after the first one of `trusted` those that have a front of their own: each front once, the most trusted first.
 pub(super) fn other_fronts(clips: &[ClipResult], trusted: &[usize], config: &Config) -> Vec<usize> {
-    /// Two planes fitted to one front differ by a few centimetres.
-    const DEEPER_M: f64 = 0.08;
+    // Two planes fitted to one front differ by a few centimetres.
+    let deeper_m = config.inference.merge_deeper_m;
     let one = |a: &Face, b: &Face| {
         signed_angle(&a.normal, &b.normal) <= config.inference.merge_angle_deg.to_radians()
-            && a.coordinates(&b.center)[2].abs() <= DEEPER_M
+            && a.coordinates(&b.center)[2].abs() <= deeper_m
     };
     let mut fronts: Vec<(usize, Face)> = Vec::new();
     for (clip, face) in trusted.iter().filter_map(|&c| Some((c, clips[c].face?))) {
@@ -124,7 +122,7 @@ mod tests {
             extent: [[-1.0, 1.0]; 2],
             support,
         };
-        let grip = face.point(0.0, 0.0, front + Config::default().geometry.grip_standoff_m + off);
+        let grip = face.point(0.0, 0.0, front + Config::default().priors.handles.standoff_m + off);
         clip.face = Some(Face { center: face.point(0.0, 0.0, front), ..face });
         if let Some(hand) = &mut clip.trajectory {
             hand.ends_seen = [seen; 2];

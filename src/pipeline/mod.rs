@@ -2,18 +2,25 @@
 
 mod clip;
 mod closed;
+pub mod frames;
+mod looks;
 mod refit;
 mod room;
 mod scene;
+mod through;
+mod timelines;
 mod told;
+mod videos;
+mod weigh;
+mod without_depth;
 
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::articulation::{Articulation, Outcome};
-use crate::config::{Config, LineMethod};
+use crate::articulation::{Action, Articulation, Outcome};
+use crate::config::{Config, InferenceMethod, LineMethod, RoomFrame};
 use crate::error::{Error, Result};
 use crate::geometry::Rect;
 use crate::geometry::segments::{LiftedSegment, LineDetector, lift};
@@ -26,8 +33,10 @@ use crate::reasoning::words::Words;
 use crate::reasoning::{Answer, Reasoner};
 use crate::recording::narration;
 use crate::recording::sketch::Sketch;
-use crate::recording::{AtWork, Clip, DepthFactors, Recording};
-pub use room::{RoomCell, RoomCells};
+use crate::recording::{AtWork, Clip, DepthFactors, Recording, Surfaces, Videos};
+pub use looks::{Forgetful, LookStore};
+pub use room::{FreeRun, Gathering, RoomCell, RoomCells, gather};
+pub use videos::together;
 
 /// Everything that was found out about one clip, step by step.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -120,14 +129,16 @@ pub struct SceneJoint {
     pub hypotheses: Vec<Hypothesis>,
 }
 
-/// A clip in which no hand was followed, and which by its narration closes what the clip before it opened, or opens what the
-/// clip after it closes.
+/// A clip that moves a part without being evidence about it: no hand was followed in it, and by its narration it closes what the
+/// clip before it opened, or opens what the clip after it closes; or its hand is misread, as those of more clips show.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Told {
     /// Its name.
     pub clip: String,
-    /// The name of that other clip; the part moved as far in either.
+    /// The name of a clip that shows the part; it moved as far in either.
     pub with: String,
+    /// What this clip does.
+    pub action: Action,
 }
 
 /// One way in which a part could move, with what depends on it.
@@ -183,6 +194,9 @@ pub struct Scene {
     pub recording: String,
     /// The room's frame (§A.5).
     pub manhattan: Option<ManhattanFrame>,
+    /// The videos that the recording was joined of.
+    #[serde(default, skip_serializing_if = "Videos::is_empty")]
+    pub videos: Videos,
     /// What the frames' depth was multiplied by.
     pub depth_factors: DepthFactors,
     /// Clips in the recording's order.
@@ -195,6 +209,15 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// Whether nothing of a joint's furniture was seen in any of its clips, as in recordings without depth: its front and its boxes
+    /// are where the hand says that they could be.
+    #[must_use]
+    pub fn is_assumed(&self, joint: &SceneJoint) -> bool {
+        let of = |name: &String| self.clips.iter().find(|c| c.clip.clip == *name);
+        let mut clips = joint.clips.iter().filter_map(of).peekable();
+        joint.part.is_none() && clips.peek().is_some() && clips.all(|c| c.region.is_none())
+    }
+
     /// The joint that a clip moves, seen or told.
     #[must_use]
     pub fn joint_of(&self, clip: &str) -> Option<&SceneJoint> {
@@ -217,10 +240,45 @@ pub fn infer(
     reasoner: &dyn Reasoner,
     progress: Progress,
 ) -> Result<Scene> {
+    infer_keeping(recording, config, detector, reasoner, progress, &Forgetful)
+}
+
+/// The same; what frames show is kept in a store, or taken from it, which changes no byte of the result.
+///
+/// # Errors
+/// As [`infer`].
+pub fn infer_keeping(
+    recording: &Recording,
+    config: &Config,
+    detector: &dyn LineDetector,
+    reasoner: &dyn Reasoner,
+    progress: Progress,
+    store: &dyn LookStore,
+) -> Result<Scene> {
     check_depth(recording)?;
     // The one place where names are taken away: whatever reads them later reads these clips.
     let unnamed = (!config.reasoning.use_names).then(|| narration::without_names(recording));
     let recording = unnamed.as_ref().unwrap_or(recording);
+    // The paper has no answer without depth.
+    let has_answer = recording.surfaces() == Surfaces::Depth || config.inference.method == InferenceMethod::Paper;
+    let mut scene = match has_answer {
+        true => with_depth(recording, config, detector, reasoner, progress, store)?,
+        false => without_depth::infer(recording, config, detector, reasoner, progress)?,
+    };
+    let left_out = recording.left_out.clips.iter();
+    scene.clips.extend(left_out.map(|(clip, why)| ClipResult::unanswered(clip.clone(), why.clone())));
+    Ok(scene)
+}
+
+/// The same where surfaces are seen.
+fn with_depth(
+    recording: &Recording,
+    config: &Config,
+    detector: &dyn LineDetector,
+    reasoner: &dyn Reasoner,
+    progress: Progress,
+    store: &dyn LookStore,
+) -> Result<Scene> {
     let counter = std::sync::atomic::AtomicUsize::new(0);
     let start = |step: &str, total: usize| {
         counter.store(0, std::sync::atomic::Ordering::Relaxed);
@@ -250,7 +308,7 @@ pub fn infer(
         let seen: Vec<Option<(Sketch, Vec<LiftedSegment>)>> = fresh
             .par_iter()
             .map(|&frame| {
-                let seen = look_at(recording, frame, lines.then_some(detector), config);
+                let seen = look_once(recording, frame, lines.then_some(detector), config, store);
                 tick("looking", fresh.len());
                 seen
             })
@@ -263,7 +321,7 @@ pub fn infer(
     };
     let metric = |recording: &Recording, looks: &Looks| Recording {
         depth_factors: match config.geometry.depth_scale {
-            true => depth_scale::solve(recording, &looks.sketches),
+            true => depth_scale::solve(recording, &looks.sketches, &config.geometry.scales),
             false => DepthFactors::default(),
         },
         ..recording.clone()
@@ -278,8 +336,9 @@ pub fn infer(
     let located_in = metric(recording, &looks);
     let total = recording.clips.len();
     start("localising", total);
-    let occupancy = config.localization.occlusion.then(|| views::Occupancy::of(&located_in, &looks.sketches));
-    let idle = views::idle(recording, &at_work);
+    let occupancy =
+        config.localization.occlusion.then(|| views::Occupancy::of(&located_in, &looks.sketches, &config.localization));
+    let idle = views::idle(recording, &at_work, &config.localization);
     let footage =
         Footage { recording: &located_in, sketches: &looks.sketches, at_work: &at_work, located: &located_in };
     let located: Vec<clip::Located> = recording
@@ -310,7 +369,7 @@ pub fn infer(
         }
         LineMethod::Unprojected => Vec::new(),
     };
-    let room = manhattan::estimate(&rectified, &with_normals_first(recording, &wanted), &config.geometry)?;
+    let room = manhattan::estimate(&rectified, &with_normals_first(recording, &wanted, config), &config.geometry)?;
 
     start("inferring", total);
     let footage = Footage { recording: &rectified, sketches: &looks.sketches, at_work: &at_work, located: &located_in };
@@ -326,10 +385,10 @@ pub fn infer(
         })
         .collect::<Result<_>>()?;
     let joints = scene::merge(&footage, &clips, reasoner, config);
-    let up = clip::upward(&rectified, room.as_ref());
+    let up = clip::upward(&rectified, room.as_ref(), config);
     let surroundings = room::cells(&footage, room.as_ref(), &up, &config.fitting);
-    let Recording { name: recording, depth_factors, .. } = rectified;
-    Ok(Scene { recording, manhattan: room, depth_factors, clips, joints, surroundings })
+    let Recording { name: recording, depth_factors, videos, .. } = rectified;
+    Ok(Scene { recording, manhattan: room, videos, depth_factors, clips, joints, surroundings })
 }
 
 /// What was kept of the frames that were looked at.
@@ -339,6 +398,26 @@ struct Looks {
     sketches: BTreeMap<usize, Sketch>,
     /// Line segments of the frames in which nothing moves.
     segments: BTreeMap<usize, Vec<LiftedSegment>>,
+}
+
+/// What a store has of a frame, else a look at it, which is kept.
+fn look_once(
+    recording: &Recording,
+    frame: usize,
+    detector: Option<&dyn LineDetector>,
+    config: &Config,
+    store: &dyn LookStore,
+) -> Result<Option<(Sketch, Vec<LiftedSegment>)>> {
+    let with_lines = detector.is_some();
+    let known = store.find(recording, frame, with_lines).and_then(|bytes| looks::decoded(&bytes, frame));
+    if known.is_some() {
+        return Ok(known);
+    }
+    let look = look_at(recording, frame, detector, config)?;
+    if let Some((sketch, segments)) = &look {
+        store.keep(recording, frame, with_lines, &looks::encoded(sketch, segments));
+    }
+    Ok(look)
 }
 
 /// Decodes what a frame has, once; `None` where it has no depth. Without a detector its lines are not looked for.
@@ -367,16 +446,6 @@ fn check_depth(recording: &Recording) -> Result<()> {
     let with_depth: Vec<usize> =
         (0..recording.frames.len()).filter(|&f| recording.frames[f].files.depth.is_some()).collect();
     if with_depth.is_empty() {
-        if recording.reconstruction.is_empty() {
-            return Err(Error::Recording {
-                path: recording.dir.clone(),
-                faults: vec![
-                    "no depth: there is neither depth/000000.png ... nor reconstruction.ply or .obj; run a metric depth \
-                     estimator (MoGe-2) or add a static reconstruction"
-                        .to_owned(),
-                ],
-            });
-        }
         return Ok(());
     }
     // Hands tell what depth should be where they are: a ratio far from 1 is a unit, not an error of estimation.
@@ -389,7 +458,7 @@ fn check_depth(recording: &Recording) -> Result<()> {
         let Some(depth) = recording.depth(hand.frame)? else { continue };
         any |= depth.data.iter().any(|z| *z > 0.0);
         let local = recording.frames[hand.frame].world_from_camera.inverse() * hand.grasp();
-        let seen = recording.camera.project(&local).and_then(|(u, v)| depth.nearest(u, v));
+        let seen = recording.camera_of(hand.frame).project(&local).and_then(|(u, v)| depth.nearest(u, v));
         ratios.extend(seen.filter(|z| *z > 0.0).map(|z| f64::from(z) / local.z));
     }
     if let Some(ratio) = crate::math::stats::median(&ratios).filter(|r| !(0.2..8.0).contains(r)) {
@@ -419,12 +488,11 @@ fn check_depth(recording: &Recording) -> Result<()> {
     })
 }
 
-/// Views for the room's frame: those with a normals file first, at most thirty.
-fn with_normals_first(recording: &Recording, views: &[usize]) -> Vec<usize> {
-    // The frame of a room is known to a fraction of a degree from far fewer.
-    const ENOUGH: usize = 30;
+/// Views for the room's frame: those with a normals file first, at most so many as are enough for it.
+fn with_normals_first(recording: &Recording, views: &[usize], config: &Config) -> Vec<usize> {
+    let RoomFrame { views: enough, views_alone, .. } = config.geometry.frame;
     let (with, without): (Vec<usize>, Vec<usize>) =
         views.iter().partition(|&&v| recording.frames[v].files.normals.is_some());
-    let all: Vec<usize> = if with.len() >= 5 { with } else { with.into_iter().chain(without).collect() };
-    (0..all.len().min(ENOUGH)).map(|i| all[i * all.len() / all.len().min(ENOUGH)]).collect()
+    let all: Vec<usize> = if with.len() >= views_alone { with } else { with.into_iter().chain(without).collect() };
+    (0..all.len().min(enough)).map(|i| all[i * all.len() / all.len().min(enough)]).collect()
 }

@@ -3,27 +3,23 @@
 use super::ClipResult;
 use crate::articulation::{Action, Articulation};
 use crate::config::Config;
-use crate::geometry::ajar;
-use crate::geometry::moved::{self, Hold};
-use crate::geometry::openings::{self, OpenState, Opening};
-use crate::geometry::outline::Stop;
-use crate::geometry::{AxisSource, Face, Rect, candidates, front, outline};
+use crate::geometry::{AxisSource, Face, Rect, candidates};
 use crate::hands::{self, Trajectory};
 use crate::inference;
 use crate::inference::uncertainty::OpenStates;
 use crate::localization::Footage;
 use crate::math::{Point, stats};
+use crate::part::openings::{self, OpenState, Opening};
+use crate::part::outline::{self, Stop};
+use crate::part::views::{self, Hold};
+use crate::part::{ajar, front};
 use crate::recording::Clip;
-
-/// Error of a place that no number of views makes smaller, metres: depth is off alike wherever the same surface is seen from
-/// about the same distance.
-const SPOT_STD_M: f64 = 0.015;
 
 /// A joint after its open views were looked at.
 pub(super) struct Refitted<'a> {
     pub(super) joint: Articulation,
     /// All clips' views of the open state, and the opening in each.
-    pub(super) views: Vec<moved::View<'a>>,
+    pub(super) views: Vec<views::View<'a>>,
     pub(super) openings: Vec<f64>,
     /// Opening that each clip went through, rad or m.
     pub(super) ranges: Vec<f64>,
@@ -53,13 +49,14 @@ pub(super) struct Believed {
 impl Believed {
     /// What is believed once an outline was fitted to the same joint: a hinge is at the side of its part, and lines tell
     /// sides better than depth tells hinges. Lines that depth speaks against belong to something else.
-    pub(super) fn at_side(self, fit: &Refitted, face: &Face, rect: &Rect, stops: &[Stop]) -> Self {
-        /// Standard deviations that line and depth may be apart.
-        const AGREE: f64 = 2.5;
+    pub(super) fn at_side(self, fit: &Refitted, face: &Face, rect: &Rect, stops: &[Stop], config: &Config) -> Self {
+        let agree = config.inference.states.agree_stds;
         let line_m = AxisSource::Line.position_std_m();
         let Some(cov) = fit.depth.hinge_cov_m2 else { return self };
-        let Some((along, off)) = front::to_lined_side(face, rect, &fit.joint, stops) else { return self };
-        if off.abs() > AGREE * cov[1][1].sqrt().hypot(line_m) {
+        let Some((along, off)) = front::to_lined_side(face, rect, &fit.joint, stops, &config.part.front) else {
+            return self;
+        };
+        if off.abs() > agree * cov[1][1].sqrt().hypot(line_m) {
             return self;
         }
         let way = along * (off + along.dot(&(fit.joint.origin - self.joint.origin)));
@@ -75,15 +72,16 @@ pub(super) fn refitted<'a>(
     shown: &[(&ClipResult, &Trajectory)],
     believed: &Believed,
     closed: &Closed,
-    config: &Config,
+    config: &'a Config,
 ) -> Option<Refitted<'a>> {
+    let rules = &config.inference.states;
     let Closed { face, rect, .. } = closed;
     let Footage { recording, sketches, .. } = *footage;
     let joint = &believed.joint;
-    let noise = openings::Noise { hinge_m: believed.hinge_m, board_m: config.fitting.board_m };
-    let views: Vec<Vec<moved::View>> =
-        shown.iter().map(|(clip, t)| moved::open_views(recording, sketches, &clip.clip, t)).collect();
-    let still: Vec<Vec<moved::View>> = shown.iter().map(|(clip, t)| closed_views(footage, clip, t, config)).collect();
+    let prior = openings::Prior { hinge_m: believed.hinge_m, board_m: config.priors.boards.thickness_m };
+    let views: Vec<Vec<views::View>> =
+        shown.iter().map(|(clip, t)| views::open_views(recording, sketches, &clip.clip, t, &config.part)).collect();
+    let still: Vec<Vec<views::View>> = shown.iter().map(|(clip, t)| closed_views(footage, clip, t, config)).collect();
     let states: Vec<OpenState> = shown
         .iter()
         .zip(views.iter().zip(&still))
@@ -94,13 +92,13 @@ pub(super) fn refitted<'a>(
             closed,
         })
         .collect();
-    let mut fit = openings::refit(face, rect, joint, &states, &noise)?;
+    let mut fit = openings::refit(face, rect, joint, &states, &prior, &config.part)?;
     if let Some(axis) = within_front(joint, face) {
         // Along its front a leaf shows no depth of its own; the place that it left does.
         for (view, opening) in states.iter().flat_map(|s| s.views).zip(fit.openings.iter_mut().flatten()) {
-            let votes = outline::vote(face, closed.surface, std::slice::from_ref(view), None, &config.fitting);
+            let votes = outline::vote(face, closed.surface, std::slice::from_ref(view), None, config);
             if let Some(value) = votes.vacated(axis, rect.bounds[1 - axis]) {
-                *opening = Opening { value, std: 2.0 * config.fitting.cell_m, informed: true };
+                *opening = Opening { value, std: rules.vacated_cells * config.fitting.cell_m, informed: true };
             }
         }
     }
@@ -108,9 +106,9 @@ pub(super) fn refitted<'a>(
         .iter()
         .zip(&states)
         .zip(&fit.openings)
-        .map(|(((_, t), state), seen)| open_end(&fit.joint, t, state, seen))
+        .map(|(((_, t), state), seen)| open_end(&fit.joint, t, state, seen, config))
         .collect();
-    let ends = left_where_found(shown, &ends);
+    let ends = left_where_found(shown, &ends, rules.at_odds_stds);
     let begins: Vec<Opening> = shown
         .iter()
         .zip(states.iter().zip(&ends))
@@ -118,13 +116,11 @@ pub(super) fn refitted<'a>(
         .collect();
     let ranges = ends.iter().zip(&begins).map(|(end, begin)| (end.value - begin.value).max(0.0)).collect();
     // The views share a hand, a depth estimate and an outline: covariances that take them for independent are too small.
-    let shared = config.inference.shared_errors;
+    let (shared, spot) = (config.inference.shared_errors, rules.spot_std_m * rules.spot_std_m);
     let depth = OpenStates {
         across: fit.across,
         hinge_cov_m2: fit.hinge_cov_m2.map(|rows| {
-            std::array::from_fn(|i| {
-                std::array::from_fn(|k| shared * rows[i][k] + if i == k { SPOT_STD_M * SPOT_STD_M } else { 0.0 })
-            })
+            std::array::from_fn(|i| std::array::from_fn(|k| shared * rows[i][k] + if i == k { spot } else { 0.0 }))
         }),
         moved_std: ends.iter().zip(&begins).map(|(end, begin)| shared.sqrt() * end.std.hypot(begin.std)).collect(),
     };
@@ -142,8 +138,14 @@ fn within_front(joint: &Articulation, face: &Face) -> Option<usize> {
 
 /// Opening at the open end of a clip. After the hand let go the part stands there: what those views show counts, else what is
 /// seen while the hand holds it, brought to the end of the hand's way.
-fn open_end(joint: &Articulation, trajectory: &Trajectory, state: &OpenState, seen: &[Opening]) -> Opening {
-    let told = moved::told(joint, &state.grip, state.views);
+fn open_end(
+    joint: &Articulation,
+    trajectory: &Trajectory,
+    state: &OpenState,
+    seen: &[Opening],
+    config: &Config,
+) -> Opening {
+    let told = views::told(joint, &state.grip, state.views);
     let end = joint.opening_at(&state.grip, &trajectory.open_grip());
     // The median of what some views say, and the standard deviation of the surest of them: they share the hand's and the depth's
     // errors, so together they are no surer.
@@ -162,7 +164,7 @@ fn open_end(joint: &Articulation, trajectory: &Trajectory, state: &OpenState, se
     let any = seen.iter().map(|o| o.std).fold(f64::INFINITY, f64::min);
     let (value, surest) = after.or(during.map(|(offset, std)| (end + offset, std))).unwrap_or((end, any));
     // A hand that was lost and a part that nobody saw afterwards leave the end open.
-    let lever = joint.lever(&state.grip).max(openings::LEAST_LEVER_M);
+    let lever = joint.lever(&state.grip).max(config.part.least_lever_m);
     let unseen = after.is_none() && !trajectory.open_end_seen();
     let std = if unseen { surest.hypot(hands::grip_std_m(false) / lever) } else { surest };
     Opening { value, std, informed: after.or(during).is_some() }
@@ -173,8 +175,8 @@ fn closed_views<'a>(
     footage: &Footage<'a>,
     shown: &ClipResult,
     trajectory: &Trajectory,
-    config: &Config,
-) -> Vec<moved::View<'a>> {
+    config: &'a Config,
+) -> Vec<views::View<'a>> {
     let grip = trajectory.closed_grip();
     let [first, last] = trajectory.contact_frames();
     if !config.localization.closed_state_frames {
@@ -182,7 +184,7 @@ fn closed_views<'a>(
     }
     let Footage { recording, sketches, .. } = *footage;
     let between = |c: &Clip, frame: usize| c.start_frame < first && c.end_frame > frame && c.clip != shown.clip.clip;
-    let frames: Vec<moved::OpenFrame> = shown
+    let frames: Vec<views::OpenFrame> = shown
         .closed_frames
         .iter()
         .copied()
@@ -190,9 +192,9 @@ fn closed_views<'a>(
             Action::Open => frame <= last && !recording.clips.iter().any(|c| between(c, frame)),
             Action::Close => frame >= first,
         })
-        .map(|frame| moved::OpenFrame { frame, grip, hold: Hold::Sure })
+        .map(|frame| views::OpenFrame { frame, grip, hold: Hold::Sure })
         .collect();
-    moved::views(recording, sketches, &frames)
+    views::views(recording, sketches, &frames, &config.part)
 }
 
 /// Opening at the closed end of a clip: zero unless the part is seen to stand ajar.
@@ -208,27 +210,29 @@ fn closed_end(
     if !end.informed || within_front(joint, &closed.face).is_some() {
         return Opening::SHUT;
     }
-    let lever = joint.lever(&state.grip).max(openings::LEAST_LEVER_M);
+    let lever = joint.lever(&state.grip).max(config.part.least_lever_m);
     let known = ajar::Known {
         end: end.value,
         went: joint.opening_at(&state.grip, &trajectory.open_grip()),
         went_std: way_std_m(trajectory) / lever,
+        board_m: config.priors.boards.thickness_m,
+        shut: config.priors.ranges.shut_share,
     };
-    ajar::ajar(&closed.face, &closed.rect, joint, state.closed, &known, config.fitting.board_m)
+    ajar::ajar(&closed.face, &closed.rect, joint, state.closed, &known, &config.part)
 }
 
 /// The openings that the hands alone tell, rad or m: each clip's, made one where a clip closes what the one before it opened.
-pub(super) fn by_hand(shown: &[(&ClipResult, &Trajectory)], joint: &Articulation) -> Vec<f64> {
+pub(super) fn by_hand(shown: &[(&ClipResult, &Trajectory)], joint: &Articulation, config: &Config) -> Vec<f64> {
     let ends: Vec<Opening> = shown
         .iter()
         .map(|(_, t)| {
             let grip = t.closed_grip();
             let value = inference::observed_range(joint, &grip, &t.positions());
-            let std = way_std_m(t) / joint.lever(&grip).max(openings::LEAST_LEVER_M);
+            let std = way_std_m(t) / joint.lever(&grip).max(config.part.least_lever_m);
             Opening { value, std, informed: false }
         })
         .collect();
-    left_where_found(shown, &ends).iter().map(|end| end.value).collect()
+    left_where_found(shown, &ends, config.inference.states.at_odds_stds).iter().map(|end| end.value).collect()
 }
 
 /// Standard deviation of the way of a hand, metres: of both of its ends.
@@ -238,10 +242,9 @@ fn way_std_m(trajectory: &Trajectory) -> f64 {
 
 /// A part stays where it was left: the open end of a clip is where the next clip of the part finds it. Both clips' values
 /// become their weighted mean, which is surer than either: each clip has a hand's and a depth's error of its own. Where they
-/// are at odds, one of the hands was followed on a part of its way only, and the farther one saw more of it.
-fn left_where_found(shown: &[(&ClipResult, &Trajectory)], ends: &[Opening]) -> Vec<Opening> {
-    /// Standard deviations of the fit, which are too small (`inference.shared_errors`): of the true ones about two.
-    const AT_ODDS: f64 = 4.0;
+/// are `at_odds` (standard deviations), one of the hands was followed on a part of its way only, and the farther one saw more of
+/// it.
+fn left_where_found(shown: &[(&ClipResult, &Trajectory)], ends: &[Opening], at_odds: f64) -> Vec<Opening> {
     let mut order: Vec<usize> = (0..shown.len()).collect();
     order.sort_by_key(|&i| (shown[i].0.clip.start_frame, i));
     let mut out = ends.to_vec();
@@ -250,7 +253,7 @@ fn left_where_found(shown: &[(&ClipResult, &Trajectory)], ends: &[Opening]) -> V
         if shown[a].1.action == Action::Open && shown[b].1.action == Action::Close {
             let [wa, wb] = [a, b].map(|i| ends[i].std.powi(-2));
             let apart = (ends[a].value - ends[b].value).abs() / ends[a].std.hypot(ends[b].std);
-            if apart > AT_ODDS && ends[a].informed && ends[b].informed {
+            if apart > at_odds && ends[a].informed && ends[b].informed {
                 let farther = if ends[a].value > ends[b].value { ends[a] } else { ends[b] };
                 for i in [a, b] {
                     out[i] = farther;
@@ -299,7 +302,7 @@ mod tests {
             let depth = OpenStates { across: [y, x], hinge_cov_m2, moved_std: Vec::new() };
             let (openings, ranges) = (Vec::new(), Vec::new());
             let fit = Refitted { joint: hinge(found), views: Vec::new(), openings, ranges, widest: 0.0, depth };
-            Believed { joint: hinge(-0.3), hinge_m: 0.02 }.at_side(&fit, &face, &rect, stops)
+            Believed { joint: hinge(-0.3), hinge_m: 0.02 }.at_side(&fit, &face, &rect, stops, &Config::default())
         };
         let three = Some([[1e-4, 0.0], [0.0, 9e-4]]);
         // As sure as a line tells hinges: half the way, and surer by the root of two. Nothing moves but along the front.
@@ -319,20 +322,20 @@ mod tests {
         let (clips, hands) = ([20, 10, 30].map(clip), [Action::Close, Action::Open, Action::Close].map(hand));
         let shown: Vec<(&ClipResult, &Trajectory)> = clips.iter().zip(&hands).collect();
         let ends = [(1.1, 0.04), (1.0, 0.03), (0.5, 0.05)].map(|(value, std)| Opening { value, std, informed: true });
-        let found = left_where_found(&shown, &ends);
+        let found = left_where_found(&shown, &ends, 4.0);
         // Variances of 16 and 9 to one of 144 / 25.
         assert!((found[0].std - 0.024).abs() < 1e-12 && (found[0].value - 1.036).abs() < 1e-12, "{found:?}");
         assert_eq!((found[0], found[2]), (found[1], ends[2]));
         // At odds: the hand that was followed on a part of its way saw less.
         let [farther, nearer] = [(1.8, 0.03), (0.4, 0.02)].map(|(value, std)| Opening { value, std, informed: true });
-        let found = left_where_found(&shown, &[nearer, farther, ends[2]]);
+        let found = left_where_found(&shown, &[nearer, farther, ends[2]], 4.0);
         assert_eq!((found[0], found[1]), (farther, farther));
         // Where depth told one of them nothing both count as they are sure.
-        let told = left_where_found(&shown, &[nearer, Opening { informed: false, ..farther }, ends[2]]);
+        let told = left_where_found(&shown, &[nearer, Opening { informed: false, ..farther }, ends[2]], 4.0);
         assert!(told[0].value > 0.4 && told[0].value < 1.8 && told[0].value == told[1].value, "{told:?}");
         // A clip without a view takes over what the other one saw.
         let unseen = [Opening { std: f64::INFINITY, ..ends[0] }, ends[1], ends[2]];
-        let found = left_where_found(&shown, &unseen);
+        let found = left_where_found(&shown, &unseen, 4.0);
         assert!((found[0].std - 0.03).abs() < 1e-12 && (found[0].value - 1.0).abs() < 1e-12, "{found:?}");
     }
 }

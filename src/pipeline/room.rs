@@ -1,4 +1,5 @@
-//! What stands around and does not move: cells of a grid in which several views saw a surface (ours).
+//! What stands around and does not move: cells of a grid in which several views saw a surface, and those that they saw
+//! through (ours).
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -7,7 +8,10 @@ use crate::config;
 use crate::geometry::ManhattanFrame;
 use crate::localization::{self, Footage};
 use crate::math::{Point, Vector, any_orthogonal, reject, unit};
+use crate::recording::Recording;
 use crate::recording::sketch::Sketch;
+
+use super::through::Through;
 
 /// One cell with a surface in it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -21,6 +25,15 @@ pub struct RoomCell {
     pub extent: [[f64; 2]; 3],
 }
 
+/// Empty cells one above the other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FreeRun {
+    /// Their first two indices.
+    pub column: [i32; 2],
+    /// Their lowest and highest third index.
+    pub span: [i32; 2],
+}
+
 /// The static scene on a grid.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RoomCells {
@@ -30,6 +43,27 @@ pub struct RoomCells {
     pub edge_m: f64,
     /// Cells that enough views saw, by index.
     pub cells: Vec<RoomCell>,
+    /// Cells that views saw through more often than they saw a surface there, by column and span. What is neither here nor in
+    /// `cells` is unknown: inside of furniture, behind walls, or nobody looked.
+    #[serde(default)]
+    pub free: Vec<FreeRun>,
+}
+
+/// How a room is gathered.
+#[derive(Debug, Clone, Copy)]
+pub struct Gathering<'a> {
+    /// Axes of the grid: world, orthonormal.
+    pub axes: [Vector; 3],
+    /// Edge of a cell, metres.
+    pub edge_m: f64,
+    /// Every so many samples of a view count as surface.
+    pub stride: usize,
+    /// Views that must see a surface in a cell.
+    pub views: usize,
+    /// Views that must see through a cell.
+    pub free_views: usize,
+    /// What counts as seen, and as seen through.
+    pub rules: &'a config::GatheredRoom,
 }
 
 /// Gathers the depth of frames in which nobody is at work, and the static reconstruction where there is one. `None` where
@@ -42,30 +76,41 @@ pub(super) fn cells(
     up: &Vector,
     config: &config::Fitting,
 ) -> Option<RoomCells> {
-    /// Beyond three metres a metre-scale depth estimate is worth less than a voxel.
-    const NEAR_M: f64 = 3.0;
-    /// A cell at that distance still holds more than one of every other sample.
-    const STRIDE: usize = 2;
     if !config.room {
         return None;
     }
     let Footage { recording, sketches, at_work, .. } = *footage;
-    let axes = grid_axes(manhattan, up);
-    let edge_m = config.room_voxel_m;
-    let needed = config.room_min_views as u32;
+    let still: Vec<&Sketch> = sketches.values().filter(|s| !at_work.any(s.frame)).collect();
+    let how = Gathering {
+        axes: grid_axes(manhattan, up),
+        edge_m: config.room_voxel_m,
+        stride: config.gathered.stride,
+        views: config.room_min_views,
+        free_views: config.room_free_views,
+        rules: &config.gathered,
+    };
+    let room = gather(recording, &still, &how);
+    (!room.cells.is_empty()).then_some(room)
+}
+
+/// Gathers views (of frames of the recording, in which nothing moves) and the static reconstruction.
+#[must_use]
+pub fn gather(recording: &Recording, views: &[&Sketch], how: &Gathering) -> RoomCells {
+    let Gathering { axes, edge_m, stride, .. } = *how;
+    let near_m = how.rules.near_m;
+    let needed = how.views as u32;
     // A frame without depth of its own has the reconstruction's, which is taken whole below.
-    let still =
-        |frame: usize| !at_work.any(frame) && recording.frames.get(frame).is_some_and(|f| f.files.depth.is_some());
-    let still: Vec<&Sketch> = sketches.values().filter(|s| still(s.frame)).collect();
+    let own = |s: &&&Sketch| recording.frames.get(s.frame).is_some_and(|f| f.files.depth.is_some());
+    let with_depth: Vec<&Sketch> = views.iter().filter(own).copied().collect();
     let mut bins: Vec<Bin> = Vec::new();
     // In pieces: the bins of all views of a long recording together are larger than the room by far.
-    for some in still.chunks(64) {
+    for some in with_depth.chunks(64) {
         let by_view: Vec<Vec<Bin>> = some
             .par_iter()
             .map(|sketch| {
                 let eye = recording.frames[sketch.frame].center();
                 let points = localization::points(recording, sketch, None);
-                let near = points.iter().step_by(STRIDE).filter(|p| (*p - eye).norm() <= NEAR_M);
+                let near = points.iter().step_by(stride).filter(|p| (*p - eye).norm() <= near_m);
                 folded(near.filter_map(|p| Bin::of(p, &axes, edge_m, 1)).collect(), |one, _| one)
             })
             .collect();
@@ -76,12 +121,38 @@ pub(super) fn cells(
     for points in recording.reconstruction.chunks(1 << 16) {
         bins.extend(folded(points.iter().filter_map(|p| Bin::of(p, &axes, edge_m, needed)).collect(), |one, _| one));
     }
-    let cells: Vec<RoomCell> = folded(bins, u32::saturating_add)
+    let bins = folded(bins, u32::saturating_add);
+    let seen = bins.iter().filter(|b| b.views >= needed).map(|b| b.index);
+    let through = Through::of(recording, views, how, seen);
+    // Noise leaves surface before the surface; most views see through it.
+    let cells = bins
         .iter()
-        .filter(|b| b.views >= needed)
+        .filter(|b| b.views >= needed && through.at(&b.index) <= b.views)
         .map(|b| RoomCell { index: b.index, views: b.views, extent: b.extent(edge_m) })
         .collect();
-    (!cells.is_empty()).then_some(RoomCells { axes, edge_m, cells })
+    RoomCells { axes, edge_m, cells, free: free(&through, &bins, how.free_views) }
+}
+
+/// Cells that at least so many views saw through, and more than twice as many as saw a surface there.
+fn free(through: &Through, bins: &[Bin], least: usize) -> Vec<FreeRun> {
+    let surface = |index: &[i32; 3]| {
+        let bin = bins.binary_search_by(|b| b.index.cmp(index)).ok().and_then(|i| bins.get(i));
+        bin.map_or(0, |b| b.views)
+    };
+    let mut empty: Vec<[i32; 3]> = through
+        .cells()
+        .filter(|(index, views)| *views as usize >= least && *views > surface(index).saturating_mul(2))
+        .map(|(index, _)| index)
+        .collect();
+    empty.sort_unstable();
+    let mut runs: Vec<FreeRun> = Vec::new();
+    for [x, y, z] in empty {
+        match runs.last_mut() {
+            Some(run) if run.column == [x, y] && run.span[1] + 1 == z => run.span[1] = z,
+            _ => runs.push(FreeRun { column: [x, y], span: [z, z] }),
+        }
+    }
+    runs
 }
 
 /// The heading of the room's frame about the vertical, or any: furniture is set upright, and so is what surrounds it.
@@ -103,7 +174,7 @@ struct Bin {
 impl Bin {
     /// `None` for a point that is not in any room.
     fn of(p: &Point, axes: &[Vector; 3], edge_m: f64, views: u32) -> Option<Self> {
-        /// No recording walks further from its world's origin.
+        /// Numerics: no recording walks further from its world's origin, and indices of cells stay within 32 bits.
         const FAR_M: f64 = 1e5;
         let at = axes.map(|a| a.dot(&p.coords));
         if !at.iter().all(|c| c.abs() < FAR_M) {

@@ -5,23 +5,22 @@ use rayon::prelude::*;
 use super::clip::{self, part_shape};
 use super::closed::{self, Grip, by_trust};
 use super::refit;
-use super::{ClipResult, Hypothesis, SceneJoint, told};
+use super::{ClipResult, Hypothesis, SceneJoint, told, weigh, without_depth};
 use crate::articulation::{Articulation, JointKind};
-use crate::config::{Config, GroupingMethod, InferenceMethod};
+use crate::config::{Config, GroupingMethod, InferenceMethod, SceneRules};
 use crate::geometry::Rect;
-use crate::geometry::sights::{self, Sights};
-use crate::geometry::{AxisCandidate, AxisSource, Face, candidates, front, moved, outline};
+use crate::geometry::{AxisCandidate, AxisSource, Face, candidates};
 use crate::hands::{self, Trajectory};
 use crate::inference::{self, aggregate, uncertainty};
 use crate::localization::Footage;
 use crate::math::Point;
-use crate::reasoning::{self, Answer, Question, Reasoner};
+use crate::part::{front, outline, views as open_state};
+use crate::reasoning::{self, Answer, Reasoner};
 use crate::recording::narration;
 
-/// Whether a joint's hinge tells two parts apart: where its type is this sure, or nobody computed how sure it is.
-fn sure(type_probability: Option<f64>) -> bool {
-    const SURE: f64 = 0.7;
-    type_probability.is_none_or(|p| p > SURE)
+/// Whether a joint's hinge tells two parts apart: where its type is sure, or nobody computed how sure it is.
+fn sure(type_probability: Option<f64>, config: &Config) -> bool {
+    type_probability.is_none_or(|p| p > config.inference.scene.sure)
 }
 
 /// Clips to scene-level joints (§C.2).
@@ -45,12 +44,12 @@ pub(super) fn merge(
             action: trajectory.action,
             closed: trajectory.closed_grip(),
             open: trajectory.open_grip(),
-            normal: clip.face.map(|f| f.normal),
+            normal: clip.face.filter(|f| !f.is_assumed()).map(|f| f.normal),
             path,
             furniture: named.as_ref().and_then(|r| r.furniture.as_deref()),
             kind: named.as_ref().and_then(|r| r.kind),
             part: clip.face.zip(clip.part),
-            joint: clip.joint.found().filter(|j| sure(j.type_probability)).map(|j| j.joint),
+            joint: clip.joint.found().filter(|j| sure(j.type_probability, config)).map(|j| j.joint),
             voxels: clip.region.as_ref().map_or_else(Default::default, |region| region.voxels.as_slice()),
         })
         .collect();
@@ -104,7 +103,7 @@ fn regrouped(
     config: &Config,
 ) -> Vec<(Vec<usize>, SceneJoint)> {
     let front = |joint: &SceneJoint| {
-        let hung = Some(joint.joint).filter(|_| sure(joint.type_probability));
+        let hung = Some(joint.joint).filter(|_| sure(joint.type_probability, config));
         let (face, rect) = joint.face.zip(joint.part)?;
         Some(aggregate::Front { face, rect, grip: joint.grip, joint: hung })
     };
@@ -144,10 +143,6 @@ fn merged(
         })
         .collect()
 }
-
-/// So many clips of a part, those that saw it closed best, offer their candidates. All clips judge them, so that the work grows
-/// with the number of clips; more would offer the same again.
-const OFFERING: usize = 6;
 
 /// The candidates of the clips of a part (`group`, the one that saw it best among them) as far as they fit the face of that one.
 /// Where outlines are known, their sides stand for those of the clips' own ones.
@@ -207,16 +202,13 @@ struct Likely {
 }
 
 /// The answer and what else is worth a look. `merged`: judged together, so that those that agree are averaged.
-fn likely(candidates: &[AxisCandidate], answer: &Answer, merged: bool) -> Vec<Likely> {
-    // No evidence of a few nats brings less back.
-    const LEAST_SHARE: f64 = 0.01;
-    const MOST: usize = 5;
+fn likely(candidates: &[AxisCandidate], answer: &Answer, merged: bool, rules: &SceneRules) -> Vec<Likely> {
     let weights = answer.log_weights();
     inference::explanations(candidates, answer)
         .into_iter()
         .enumerate()
-        .filter(|(i, e)| *i == 0 || e.share >= LEAST_SHARE)
-        .take(MOST)
+        .filter(|(i, e)| *i == 0 || e.share >= rules.kept_share)
+        .take(rules.kept)
         .filter_map(|(_, e)| {
             let &head = e.members.first()?;
             let members: Vec<(Articulation, f64)> =
@@ -245,6 +237,22 @@ impl<'a> Group<'a> {
         let clips = self.members.iter().map(|&c| &self.clips[c]);
         clips.filter_map(|clip| Some((clip, clip.trajectory.as_ref()?))).collect()
     }
+
+    /// Whether no clip saw anything of the furniture.
+    fn is_assumed(&self) -> bool {
+        self.members.iter().all(|&c| self.clips[c].region.is_none())
+    }
+
+    /// The front under a joint: that of the clip `best`, which saw it best; where nothing was seen the one that goes with the joint.
+    fn front(&self, best: usize, joint: &Articulation, grip: &Point) -> Option<Face> {
+        if !self.is_assumed() {
+            return self.clips[best].face;
+        }
+        let others = self.members.iter().filter(|c| **c != best);
+        let faces = std::iter::once(&best).chain(others).filter_map(|&c| self.clips[c].face.as_ref());
+        let up = self.footage.recording.up();
+        Some(without_depth::front(joint, grip, faces, &up, self.config))
+    }
 }
 
 /// One part's joint, and how else it could move.
@@ -266,7 +274,7 @@ fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
         joint_probability: look.joint_probability,
         uncertainty: answer.uncertainty,
         grip: look.grip,
-        face: clips[look.best].face,
+        face: group.front(look.best, &answer.joint, &look.grip),
         part: answer.part,
         observed_range: answer.observed_range,
         moved: answer.moved,
@@ -279,29 +287,26 @@ fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
 /// clip's front explains by far, it was no front of this part, and that other one's answer stands: hands are the evidence that
 /// asks for no front, and evidence under two fronts is not comparable otherwise.
 fn borne_out(group: &Group, reasoner: &dyn Reasoner) -> Option<(Judged, Vec<Hypothesis>)> {
-    /// So many fronts are tried beside the first.
-    const OTHERS: usize = 3;
-    let trusted = by_trust(group.clips, group.members, group.config);
+    let config = group.config;
+    let by_far = config.part.by_far_nats;
+    let trusted = by_trust(group.clips, group.members, config);
     let first = under_front(group, reasoner, &trusted)?;
     let hands = Hands::of(group);
-    if group.config.inference.method == InferenceMethod::Paper || hands.best() - hands.nats(&first.1) <= BY_FAR {
+    if config.inference.method == InferenceMethod::Paper || hands.best() - hands.nats(&first.1) <= by_far {
         return Some(first);
     }
-    let others = closed::other_fronts(group.clips, &trusted, group.config);
+    let others = closed::other_fronts(group.clips, &trusted, config);
     others
         .into_iter()
-        .take(OTHERS)
+        .take(config.inference.scene.other_fronts)
         .filter_map(|clip| {
             let of: Vec<usize> = std::iter::once(clip).chain(trusted.iter().copied().filter(|c| *c != clip)).collect();
             under_front(group, reasoner, &of)
         })
-        .filter(|other| hands.nats(&other.1) - hands.nats(&first.1) > BY_FAR)
+        .filter(|other| hands.nats(&other.1) - hands.nats(&first.1) > by_far)
         .reduce(|best, next| if hands.nats(&next.1) > hands.nats(&best.1) { next } else { best })
         .or(Some(first))
 }
-
-/// Log odds, nats, that no errors which the clips of a part share make up for.
-const BY_FAR: f64 = 6.0;
 
 /// The hands of a part's clips as evidence of its joint.
 struct Hands<'a> {
@@ -338,12 +343,11 @@ impl<'a> Hands<'a> {
 fn under_front(group: &Group, reasoner: &dyn Reasoner, trusted: &[usize]) -> Option<(Judged, Vec<Hypothesis>)> {
     let mut look = judged(group, reasoner, trusted, &[])?;
     let config = group.config;
+    let rules = &config.inference.scene;
     let around = around(group, look.best);
     // Without the depth of the open states there are no other outlines than before.
     if config.inference.method == InferenceMethod::Posterior && config.inference.second_look && config.inference.refit {
-        /// Less likely joints seldom become the answer, and all of them find their place under the others' outlines.
-        const LEAST_SHARE: f64 = 0.05;
-        let worth = look.likely.iter().enumerate().filter(|(i, l)| *i == 0 || l.share >= LEAST_SHARE);
+        let worth = look.likely.iter().enumerate().filter(|(i, l)| *i == 0 || l.share >= rules.outlined_share);
         // One round tells how far the part reaches; a second one is for the hinge.
         let outlines: Vec<Rect> = worth.filter_map(|(_, l)| built(group, &look, l, &around, 1).part).collect();
         if !outlines.is_empty() {
@@ -353,7 +357,7 @@ fn under_front(group: &Group, reasoner: &dyn Reasoner, trusted: &[usize]) -> Opt
     // What physics will not be asked about is not built.
     let asked = if config.validation.feedback { look.likely.len() } else { 1 };
     let hypotheses: Vec<Hypothesis> =
-        look.likely.iter().take(asked).map(|l| built(group, &look, l, &around, ROUNDS)).collect();
+        look.likely.iter().take(asked).map(|l| built(group, &look, l, &around, rules.rounds)).collect();
     Some((look, hypotheses))
 }
 
@@ -364,12 +368,10 @@ fn under_front(group: &Group, reasoner: &dyn Reasoner, trusted: &[usize]) -> Opt
 /// falling likelihood; none in a first look, which takes what that clip knows. Every candidate is judged under the outline
 /// that suits it best.
 fn judged(group: &Group, reasoner: &dyn Reasoner, trusted: &[usize], outlines: &[Rect]) -> Option<Judged> {
-    let Group { footage: Footage { recording, sketches, .. }, clips, members, config } = *group;
+    let Group { clips, members, config, .. } = *group;
     let best = *trusted.first()?;
     let best_joint = clips[best].joint.found()?;
     let grip = best_joint.grip;
-    let best_std_m = Grip::of(clips, best)?.std_m();
-    let face = clips[best].face;
     let (mut joint, mut type_probability) = (best_joint.joint, best_joint.type_probability);
     let mut joint_probability = best_joint.joint_probability;
     let mut all_likely = Vec::new();
@@ -384,60 +386,15 @@ fn judged(group: &Group, reasoner: &dyn Reasoner, trusted: &[usize], outlines: &
             (speaker, joint) = (speakers[winner], merged);
         }
     } else if !judged_before {
-        let paths: Vec<Vec<Point>> =
-            members.iter().filter_map(|&c| clips[c].trajectory.as_ref()).map(Trajectory::positions).collect();
+        let most = config.inference.scene.offering;
         let mut offering: Vec<usize> = members.to_vec();
-        if members.len() > OFFERING {
-            offering.retain(|c| trusted.iter().take(OFFERING).any(|t| t == c));
+        if members.len() > most {
+            offering.retain(|c| trusted.iter().take(most).any(|t| t == c));
         }
-        let pooled: Vec<AxisCandidate> = pooled(clips, &offering, best, &grip, outlines, &config.inference)
-            .iter()
-            .map(|c| candidates::settled(c, &paths, &config.reasoning))
-            .collect();
-        let mut answers = Vec::new();
-        for &c in members {
-            let Some(trajectory) = &clips[c].trajectory else { continue };
-            let open = moved::open_views(recording, sketches, &clips[c].clip, trajectory);
-            let path = trajectory.positions();
-            // Depth and hands are biased clip by clip: the face and the grip of the clip itself fit its views best, those
-            // of the best clip stand in where it did not see its closed end. Every candidate gets the same choice.
-            let own = clips[c].face.filter(|own| {
-                face.is_some_and(|f| {
-                    crate::math::signed_angle(&own.normal, &f.normal) < config.inference.merge_angle_deg.to_radians()
-                })
-            });
-            let own_grip = trajectory.closed_grip();
-            let known: Vec<Option<Rect>> =
-                if outlines.is_empty() { vec![clips[best].part] } else { outlines.iter().copied().map(Some).collect() };
-            let own_std_m = hands::grip_std_m(trajectory.closed_end_seen());
-            let mut contexts: Vec<(Face, Option<Rect>, Point, f64)> = Vec::new();
-            for rect in known {
-                contexts.extend(face.map(|f| (f, rect, grip, best_std_m)));
-                // Of the best clip all of these are one.
-                contexts.extend(face.filter(|_| c != best).map(|f| (f, rect, own_grip, own_std_m)));
-            }
-            contexts.extend(own.filter(|_| c != best).map(|f| (f, clips[c].part, own_grip, own_std_m)));
-            let agreement = contexts
-                .iter()
-                .map(|(f, rect, grip, std_m)| {
-                    let sights = Sights::of(f, rect.as_ref(), &open);
-                    sights::agreements(&sights, pooled.iter().map(|k| &k.joint), grip, *std_m)
-                })
-                .reduce(|best, next| best.iter().zip(&next).map(|(a, b)| a.max(*b)).collect())
-                .unwrap_or_else(|| vec![0.0; pooled.len()]);
-            answers.push(reasoner.answer(&Question {
-                reading: &narration::read(&clips[c].clip),
-                words: clips[c].words.as_ref(),
-                path: &path,
-                grip,
-                candidates: &pooled,
-                agreement: &agreement,
-                part: outlines.first().or(clips[best].part.as_ref()).map(part_shape),
-                face: face.as_ref(),
-                up: recording.up(),
-            }));
-        }
-        let answer = Answer::together(&answers)?;
+        let (pooled, answer) = match group.is_assumed() {
+            true => without_depth::together(clips, members, &offering, config)?,
+            false => asked(group, reasoner, best, &offering, outlines)?,
+        };
         let weights = answer.log_weights();
         let revolute_probability = answer.revolute_probability(&pooled);
         let revolute = revolute_probability >= 0.5;
@@ -452,10 +409,10 @@ fn judged(group: &Group, reasoner: &dyn Reasoner, trusted: &[usize], outlines: &
             let of_type = revolute_probability.max(1.0 - revolute_probability);
             type_probability = Some(of_type);
             joint_probability = Some(of_type * inference::agreeing_share(&pooled[top].joint, &all));
-            all_likely = likely(&pooled, &answer, true);
+            all_likely = likely(&pooled, &answer, true, &config.inference.scene);
         }
     } else if let (InferenceMethod::Posterior, Some(answer)) = (config.inference.method, &clips[best].answer) {
-        all_likely = likely(&clips[best].candidates, answer, false);
+        all_likely = likely(&clips[best].candidates, answer, false, &config.inference.scene);
     }
     match all_likely.first_mut() {
         Some(answer) => answer.joint = joint,
@@ -468,6 +425,66 @@ fn judged(group: &Group, reasoner: &dyn Reasoner, trusted: &[usize], outlines: &
         }
     }
     Some(Judged { best, grip, likely: all_likely, type_probability, joint_probability })
+}
+
+/// The candidates that clips of a part are `offering`, and what all its clips answer about them together.
+fn asked(
+    group: &Group,
+    reasoner: &dyn Reasoner,
+    best: usize,
+    offering: &[usize],
+    outlines: &[Rect],
+) -> Option<(Vec<AxisCandidate>, Answer)> {
+    let Group { footage: Footage { recording, sketches, .. }, clips, members, config } = *group;
+    let (grip, face) = (clips[best].joint.found()?.grip, clips[best].face);
+    let best_std_m = Grip::of(clips, best)?.std_m();
+    let paths: Vec<Vec<Point>> =
+        members.iter().filter_map(|&c| clips[c].trajectory.as_ref()).map(Trajectory::positions).collect();
+    let pooled = pooled(clips, offering, best, &grip, outlines, &config.inference);
+    let pooled = weigh::settled(&pooled, &paths, config);
+    // Of the best clip: of each way in which the part could move its own outline.
+    let rects: Vec<Option<Rect>> =
+        if outlines.is_empty() { vec![clips[best].part] } else { outlines.iter().copied().map(Some).collect() };
+    let shown = |&c: &usize| {
+        let trajectory = clips[c].trajectory.as_ref()?;
+        let (own_grip, own_std_m) = (trajectory.closed_grip(), hands::grip_std_m(trajectory.closed_end_seen()));
+        // Depth and hands are biased clip by clip: the face and the grip of the clip itself fit its views best, those
+        // of the best clip stand in where it did not see its closed end. Every candidate gets the same choice.
+        let own = clips[c].face.filter(|own| {
+            face.is_some_and(|f| {
+                crate::math::signed_angle(&own.normal, &f.normal) < config.inference.merge_angle_deg.to_radians()
+            })
+        });
+        let mut closed = Vec::new();
+        for &rect in &rects {
+            closed.extend(face.map(|face| weigh::ClosedFront { face, rect, grip, grip_std_m: best_std_m }));
+            // Of the best clip all of these are one.
+            let other = face.filter(|_| c != best);
+            closed.extend(other.map(|face| weigh::ClosedFront { face, rect, grip: own_grip, grip_std_m: own_std_m }));
+        }
+        let own = own.filter(|_| c != best);
+        let rect = clips[c].part;
+        closed.extend(own.map(|face| weigh::ClosedFront { face, rect, grip: own_grip, grip_std_m: own_std_m }));
+        Some(weigh::ClipEvidence {
+            reading: narration::read(&clips[c].clip),
+            words: clips[c].words.as_ref(),
+            path: trajectory.positions(),
+            open: open_state::open_views(recording, sketches, &clips[c].clip, trajectory, &config.part),
+            closed,
+        })
+    };
+    let shown: Vec<weigh::ClipEvidence> = members.iter().filter_map(shown).collect();
+    let shape = outlines.first().or(clips[best].part.as_ref()).map(part_shape);
+    let answers = weigh::answers(
+        &shown,
+        &weigh::AskedPart { grip, face: face.as_ref(), shape },
+        &pooled,
+        recording,
+        reasoner,
+        config,
+    );
+    let answer = Answer::together(&answers)?;
+    Some((pooled, answer))
 }
 
 /// What a part's outline is told from, beside its joint.
@@ -485,34 +502,37 @@ fn around(group: &Group, best: usize) -> Around {
         .region
         .as_ref()
         .map_or_else(Vec::new, |region| clip::surface(&group.footage, region, &clip.views, group.config));
-    Around { surface, stops: clip.face.as_ref().map_or_else(Vec::new, |face| clip::edges_on(face, &clip.lines)) }
+    Around {
+        surface,
+        stops: clip.face.as_ref().map_or_else(Vec::new, |face| clip::edges_on(face, &clip.lines, group.config)),
+    }
 }
 
-/// So often hinge and openings, then the outline with them, are fitted: more than the leaf that was known at first shows where
-/// the hinge is. A third round changes hardly a hinge.
-const ROUNDS: usize = 2;
-
-/// A part under one of its joints: which way it opens, then hinge, openings and outline from the depth of the open state.
+/// A part under one of its joints: which way it opens, then hinge, openings and outline from the depth of the open state, so many
+/// `rounds` of it.
 fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around, rounds: usize) -> Hypothesis {
     let Group { footage, clips, config, .. } = *group;
-    let (best, face) = (judged.best, clips[judged.best].face);
+    let best = judged.best;
+    let face = group.front(best, &likely.joint, &judged.grip);
     let shown = group.shown();
     let trajectories = shown.iter().map(|(_, t)| *t);
-    let mut joint = inference::opening_sense(likely.joint, face.as_ref(), &judged.grip, trajectories);
+    // A front that is where the hand says tells no sense of its own, and nothing saw the part open.
+    let seen = face.filter(|_| !group.is_assumed());
+    let mut joint = inference::opening_sense(likely.joint, seen.as_ref(), &judged.grip, trajectories);
     let mut depth = None;
     let mut part = clips[best].part;
     let mut moved: Vec<f64> = match config.inference.method {
-        InferenceMethod::Posterior => refit::by_hand(&shown, &joint),
+        InferenceMethod::Posterior => refit::by_hand(&shown, &joint, config),
         InferenceMethod::Paper => {
             shown.iter().map(|(_, t)| inference::observed_range(&joint, &t.closed_grip(), &t.positions())).collect()
         }
     };
     let mut widest = moved.iter().copied().fold(0.0, f64::max);
     if config.inference.refit
-        && let Some(face) = face
+        && let Some(face) = seen
     {
         // A part of which no outline was seen to move: the piece of it around the grip.
-        let mut rect = part.unwrap_or(outline::SMALLEST);
+        let mut rect = part.unwrap_or_else(|| outline::smallest(&config.part));
         let start = refit::Believed { joint, hinge_m: config.reasoning.hand_std_m };
         let mut believed = start;
         for _ in 0..rounds {
@@ -528,9 +548,9 @@ fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around, round
                 openings: &fit.openings,
                 stops: &around.stops,
             };
-            part = front::fit(&seen, &config.fitting).or(part);
+            part = front::fit(&seen, config).or(part);
             rect = part.unwrap_or(rect);
-            believed = start.at_side(&fit, &face, &rect, &around.stops);
+            believed = start.at_side(&fit, &face, &rect, &around.stops, config);
             (joint, moved, widest, depth) = (fit.joint, fit.ranges, fit.widest, Some(fit.depth));
         }
     }
@@ -543,7 +563,7 @@ fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around, round
         moved: &moved,
         depth: depth.as_ref(),
     };
-    let uncertainty = uncertainty::of(&evidence, &config.reasoning);
+    let uncertainty = uncertainty::of(&evidence, &config.reasoning, &config.part);
     Hypothesis {
         joint,
         share: likely.share,

@@ -42,7 +42,8 @@ fn told(clips: &[ClipResult]) -> Vec<Told> {
                 [false, true] => (before, after),
                 _ => return None,
             };
-            (one && actions).then(|| Told { clip: lost.clip.clip.clone(), with: with.clip.clip.clone() })
+            let action = if lost.clip.start_frame == after.clip.start_frame { Action::Close } else { Action::Open };
+            (one && actions).then(|| Told { clip: lost.clip.clip.clone(), with: with.clip.clip.clone(), action })
         })
         .collect()
 }

@@ -5,31 +5,15 @@
 
 use nalgebra::{Translation3, UnitQuaternion};
 
-use super::grasp::{Contact, STANDOFF_M, pose};
+use super::grasp::{Contact, pose};
 use crate::articulation::JointKind;
+use crate::config;
 use crate::math::{Point, Pose, Vector};
 use crate::twin::{OrientedBox, Role, Twin};
 
-/// A common parallel gripper, gripper's axes, metres: centre and half sizes of its palm, half sizes of a finger, and how far
-/// a finger's middle is behind the fingertips' middle.
-const PALM: [[f64; 3]; 2] = [[0.0, 0.0, -0.065], [0.05, 0.02, 0.02]];
-const FINGER: [f64; 3] = [0.005, 0.010, 0.030];
-const FINGER_BACK_M: f64 = 0.015;
-/// Everything of the gripper is within this of the fingertips' middle, metres.
-const REACH_M: f64 = 0.13;
-/// Kept free around what is not the part, metres: half of how far the samples of a palm are apart, and of what furniture's
-/// place is known to.
-const FREE_M: f64 = 0.015;
-/// Kept free between the gripper and the part that it holds, whose place it knows, metres.
-const OWN_FREE_M: f64 = 0.002;
-/// Without a handle's size: fingers that hold something thin, metres.
-const THIN_M: f64 = 0.02;
-/// Turns that are tried, degrees: of the closed part with open fingers, of which one is between bar and front; then of the
-/// open part. Farther, a palm would be in the front.
-const CLOSED_DEG: [f64; 5] = [0.0, 15.0, -15.0, 30.0, -30.0];
-const OPEN_DEG: [f64; 7] = [0.0, 30.0, -30.0, 60.0, -60.0, 75.0, -75.0];
-/// Places on the way to the part, and with it, that are looked at.
+/// Numerics: places on the way to the part that are looked at.
 const APPROACH: usize = 5;
+/// Numerics: places on the way with the part.
 const WAY: usize = 13;
 
 /// Boxes, a little larger than they are.
@@ -41,10 +25,10 @@ impl Obstacles {
     }
 
     /// How many points of a gripper at a pose are inside of them.
-    fn hits(&self, gripper: &[Point], at: &Pose) -> usize {
+    fn hits(&self, gripper: &[Point], at: &Pose, reach_m: f64) -> usize {
         let middle = Point::from(at.translation.vector);
         let near: Vec<&OrientedBox> =
-            self.0.iter().filter(|b| (b.center - middle).norm() < b.half.norm() + REACH_M).collect();
+            self.0.iter().filter(|b| (b.center - middle).norm() < b.half.norm() + reach_m).collect();
         if near.is_empty() {
             return 0;
         }
@@ -68,10 +52,11 @@ fn samples(center: [f64; 3], half: [f64; 3], counts: [usize; 3]) -> Vec<Point> {
 }
 
 /// A gripper whose fingertips are a width apart, in its own axes.
-fn gripper(width: f64) -> Vec<Point> {
-    let mut points = samples(PALM[0], PALM[1], [5, 3, 3]);
+fn gripper(width: f64, config: &config::Primitives) -> Vec<Point> {
+    let ([center, half], finger) = (config.palm_m, config.finger_m);
+    let mut points = samples(center, half, [5, 3, 3]);
     for side in [-1.0, 1.0] {
-        points.extend(samples([side * (0.5 * width + FINGER[0]), 0.0, -FINGER_BACK_M], FINGER, [2, 2, 4]));
+        points.extend(samples([side * (0.5 * width + finger[0]), 0.0, -config.finger_back_m], finger, [2, 2, 4]));
     }
     points
 }
@@ -84,34 +69,37 @@ pub(super) fn turn(angle: f64) -> UnitQuaternion<f64> {
 /// The turns about the bar, rad, of a gripper that would come as the contact says: when the part is closed, and when it is
 /// open. The least with which the gripper meets no other furniture, no box of the room and not the part itself; where there
 /// is none, those with which it meets least. A slide is held the same all the way. All other furniture is closed.
-pub(super) fn tilt(twin: &Twin, index: usize, contact: &Contact) -> [f64; 2] {
+pub(super) fn tilt(twin: &Twin, index: usize, contact: &Contact, config: &config::Primitives) -> [f64; 2] {
     let Some(furniture) = twin.furniture.get(index) else { return [0.0; 2] };
     let part = &furniture.part;
     let others = twin.furniture.iter().enumerate().filter(|(i, _)| *i != index).flat_map(|(_, f)| &f.part.solids);
     let fixed = twin.furniture.iter().flat_map(|f| &f.carcass).chain(&twin.room);
-    let around = Obstacles::of(fixed.chain(others).map(|s| &s.shape), FREE_M);
-    let own = Obstacles::of(part.solids.iter().filter(|s| s.role != Role::Handle).map(|s| &s.shape), OWN_FREE_M);
-    let (open, holding) = (gripper(contact.gripper_opening_m), gripper(contact.width_m.unwrap_or(THIN_M)));
+    let around = Obstacles::of(fixed.chain(others).map(|s| &s.shape), config.around_m);
+    let own =
+        Obstacles::of(part.solids.iter().filter(|s| s.role != Role::Handle).map(|s| &s.shape), config.around_part_m);
+    let (open, holding) =
+        (gripper(contact.gripper_opening_m, config), gripper(contact.width_m.unwrap_or(config.thin_m), config));
     let (phi, upper) = (part.joint.articulation, part.joint.upper);
-    let grasp = pose(contact);
+    let (grasp, reach_m) = (pose(contact), config.reach_m);
     let hits = |[closed_at, open_at]: [f64; 2]| {
         let mut count = 0;
         let held = grasp * turn(closed_at);
         for i in 0..APPROACH {
-            let back = STANDOFF_M * (1.0 - i as f64 / (APPROACH - 1) as f64);
+            let back = config.standoff_m * (1.0 - i as f64 / (APPROACH - 1) as f64);
             let at = held * Translation3::new(0.0, 0.0, -back);
-            count += around.hits(&open, &at) + own.hits(&open, &at);
+            count += around.hits(&open, &at, reach_m) + own.hits(&open, &at, reach_m);
         }
         for i in 0..WAY {
             let share = i as f64 / (WAY - 1) as f64;
             let at = grasp * turn(closed_at + (open_at - closed_at) * share);
             // The part goes with the gripper.
-            count += own.hits(&holding, &at) + around.hits(&holding, &(phi.motion(share * upper) * at));
+            count +=
+                own.hits(&holding, &at, reach_m) + around.hits(&holding, &(phi.motion(share * upper) * at), reach_m);
         }
         count
     };
     let mut best = ([0.0; 2], usize::MAX);
-    for turns in turns(phi.kind) {
+    for turns in turns(phi.kind, config) {
         let count = hits(turns);
         if count < best.1 {
             best = (turns, count);
@@ -124,10 +112,13 @@ pub(super) fn tilt(twin: &Twin, index: usize, contact: &Contact) -> [f64; 2] {
 }
 
 /// The turns that are tried, rad: the least first, that of the closed part counting twice, as the handle must be found so.
-fn turns(kind: JointKind) -> Vec<[f64; 2]> {
+fn turns(kind: JointKind, config: &config::Primitives) -> Vec<[f64; 2]> {
+    let both =
+        |degrees: &[f64]| -> Vec<f64> { std::iter::once(0.0).chain(degrees.iter().flat_map(|d| [*d, -d])).collect() };
+    let (closed, open) = (both(&config.turns_closed_deg), both(&config.turns_open_deg));
     let mut all: Vec<[f64; 2]> = match kind {
-        JointKind::Prismatic => CLOSED_DEG.iter().map(|a| [*a, *a]).collect(),
-        JointKind::Revolute => CLOSED_DEG.iter().flat_map(|a| OPEN_DEG.iter().map(move |b| [*a, *b])).collect(),
+        JointKind::Prismatic => closed.iter().map(|a| [*a, *a]).collect(),
+        JointKind::Revolute => closed.iter().flat_map(|a| open.iter().map(move |b| [*a, *b])).collect(),
     };
     let size = |turns: &[f64; 2]| 2.0 * turns[0].abs() + turns[1].abs();
     all.sort_by(|a, b| size(a).total_cmp(&size(b)));
@@ -150,7 +141,15 @@ mod tests {
     #[test]
     fn where_the_way_is_free_a_gripper_comes_straight() {
         let twin = twin_of(vec![door()]);
-        assert_eq!(tilt(&twin, 0, &grasp::contact(&twin.furniture[0].part)), [0.0; 2]);
+        assert_eq!(
+            tilt(
+                &twin,
+                0,
+                &grasp::contact(&twin.furniture[0].part, &config::Primitives::default()),
+                &config::Primitives::default()
+            ),
+            [0.0; 2]
+        );
     }
 
     #[test]
@@ -165,10 +164,10 @@ mod tests {
         part.solids[1].shape.center = part.handle;
         part.solids[1].shape.half = Vector::new(0.06, 0.006, 0.006);
         let mut twin = twin_of(vec![part]);
-        let contact = grasp::contact(&twin.furniture[0].part);
-        assert_eq!(tilt(&twin, 0, &contact), [0.0; 2]);
+        let contact = grasp::contact(&twin.furniture[0].part, &config::Primitives::default());
+        assert_eq!(tilt(&twin, 0, &contact, &config::Primitives::default()), [0.0; 2]);
         twin.room.push(slab("room_floor", Point::new(0.0, 0.0, -0.08), Vector::new(3.0, 3.0, 0.05)));
-        let [closed, open] = tilt(&twin, 0, &contact);
+        let [closed, open] = tilt(&twin, 0, &contact, &config::Primitives::default());
         assert!(closed == 0.0 && open.abs() > 0.5, "{closed} {open}");
         // It turns towards the person, who stands at -y: there is the palm of the open door's gripper.
         let phi = twin.furniture[0].part.joint.articulation;
@@ -178,8 +177,8 @@ mod tests {
 
     #[test]
     fn a_slide_is_held_the_same_all_the_way() {
-        assert!(turns(JointKind::Prismatic).iter().all(|t| t[0] == t[1]));
-        let hinge = turns(JointKind::Revolute);
-        assert_eq!((hinge[0], hinge.len()), ([0.0; 2], CLOSED_DEG.len() * OPEN_DEG.len()));
+        assert!(turns(JointKind::Prismatic, &config::Primitives::default()).iter().all(|t| t[0] == t[1]));
+        let hinge = turns(JointKind::Revolute, &config::Primitives::default());
+        assert_eq!((hinge[0], hinge.len()), ([0.0; 2], 5 * 7));
     }
 }

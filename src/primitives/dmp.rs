@@ -18,18 +18,18 @@
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// How stiff the spring is, for a duration of 1: what is left at the end of a motion that is pushed no more is gone after
+/// Format: how stiff the spring is, for a duration of 1: what is left at the end of a motion that is pushed no more is gone after
 /// another third of it.
 const ALPHA: f64 = 25.0;
-/// The phase ends at a hundredth: the push is nearly gone, and the last basis functions are still apart.
+/// Format: the phase ends at a hundredth: the push is nearly gone, and the last basis functions are still apart.
 const PHASE_DECAY: f64 = 4.605_170_185_988_092;
-/// Basis functions: a minimum jerk of any skew is met to 2 in 1000 of its way.
+/// Format: basis functions; a minimum jerk of any skew is met to 2 in 1000 of its way.
 const BASES: usize = 20;
-/// Share of the mean square of a basis function that keeps weights small where nothing tells them.
+/// Numerics: share of the mean square of a basis function that keeps weights small where nothing tells them.
 const RIDGE: f64 = 1e-9;
-/// A coordinate whose start and goal are nearer than this has no way to scale by, rad or m.
+/// Numerics: a coordinate whose start and goal are nearer than this has no way to scale by, rad or m.
 const STILL: f64 = 1e-6;
-/// A rollout has at most this many steps.
+/// Numerics: a rollout has at most this many steps.
 const MOST_STEPS: usize = 1_000_000;
 
 /// What all primitives of a file share.

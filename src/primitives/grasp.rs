@@ -4,17 +4,10 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 use super::clear;
+use crate::config;
 use crate::hands::{Trajectory, grip_std_m};
 use crate::math::{Point, Pose, Vector, any_orthogonal, reject, unit};
 use crate::twin::{Part, Role, Solid};
-
-/// How far before the grasp a gripper waits with open fingers, and how far it goes back after it let go, metres: open
-/// fingers and what they can miss by are then clear of a handle.
-pub const STANDOFF_M: f64 = 0.10;
-/// As wide as common parallel grippers open, metres (Franka Hand).
-pub const WIDEST_M: f64 = 0.08;
-/// Free space on each side of a handle, metres: a recorded hand tells its place to three centimetres or so.
-const FREE_M: f64 = 0.035;
 
 /// What fingers close on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -77,13 +70,14 @@ pub(super) fn tilted(contact: &Contact, tilt_rad: [f64; 2]) -> Contact {
 
 /// The contact of a part: straight at its face, fingers across the bar of its handle.
 #[must_use]
-pub fn contact(part: &Part) -> Contact {
+pub fn contact(part: &Part, config: &config::Primitives) -> Contact {
     let [right, out] = [0, 2].map(|i| part.bounds.rotation.column(i).into_owned());
     let approach = -out;
     let handle = part.solids.iter().filter(|s| s.role == Role::Handle).max_by(|a, b| length(a).total_cmp(&length(b)));
     // Across the bar; a knob is held level.
     let across = handle.and_then(|bar| {
         let (axis, half) = (longest(bar), bar.shape.half);
+        // Geometry: a bar, not a knob.
         let is_long = half.max() > 1.5 * (half.sum() - half.max() - half.min());
         unit(&approach.cross(&axis)).filter(|_| is_long)
     });
@@ -102,7 +96,7 @@ pub fn contact(part: &Part) -> Contact {
         approach,
         closing,
         width_m: width,
-        gripper_opening_m: width.map_or(WIDEST_M, |w| (w + 2.0 * FREE_M).min(WIDEST_M)),
+        gripper_opening_m: width.map_or(config.widest_m, |w| (w + 2.0 * config.beside_handle_m).min(config.widest_m)),
         tilt_rad: [0.0; 2],
     }
 }
@@ -139,11 +133,11 @@ mod tests {
     fn fingers_close_across_the_bar_and_come_straight_at_the_face() {
         // An upright bar is held from the sides, a level one from above and below.
         for (part, across) in [(door(), Vector::x()), (drawer(), Vector::z())] {
-            let contact = contact(&part);
+            let contact = contact(&part, &config::Primitives::default());
             assert!((contact.approach - Vector::y()).norm() < 1e-12, "{contact:?}");
             assert!((contact.closing - across).norm() < 1e-12, "{contact:?}");
             assert!((contact.width_m.unwrap() - 0.012).abs() < 1e-12);
-            assert!((contact.gripper_opening_m - WIDEST_M).abs() < 1e-12);
+            assert!((contact.gripper_opening_m - config::Primitives::default().widest_m).abs() < 1e-12);
             assert_eq!((contact.hold, contact.point), (Hold::Handle, part.handle));
             let pose = pose(&contact);
             assert!((pose.rotation * Vector::z() - contact.approach).norm() < 1e-9);
@@ -155,8 +149,11 @@ mod tests {
     fn a_part_without_a_handle_says_so() {
         let mut part = door();
         part.solids.retain(|s| s.role != Role::Handle);
-        let contact = contact(&part);
-        assert_eq!((contact.hold, contact.width_m, contact.gripper_opening_m), (Hold::Surface, None, WIDEST_M));
+        let contact = contact(&part, &config::Primitives::default());
+        assert_eq!(
+            (contact.hold, contact.width_m, contact.gripper_opening_m),
+            (Hold::Surface, None, config::Primitives::default().widest_m)
+        );
         assert!((contact.closing - Vector::x()).norm() < 1e-12);
     }
 }

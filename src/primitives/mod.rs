@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::articulation::{Action, Articulation, JointKind};
+use crate::config;
 use crate::hands::Trajectory;
 use crate::inference::Uncertainty;
 use crate::math::{Point, Pose, Vector, unit};
@@ -22,9 +23,9 @@ pub use timing::{Timing, TimingSource};
 
 /// What the file calls its own format.
 pub const SCHEMA: &str = "paws-primitives/1";
-/// Samples of a path in the file: a full turn of a door's handle is then known to a millimetre between them.
+/// Format: samples of a path in the file: a full turn of a door's handle is then known to a millimetre between them.
 const PATH: usize = 61;
-/// Samples that a primitive is fitted to.
+/// Numerics: samples that a primitive is fitted to.
 const FITTED: usize = 201;
 
 /// What a recording says about one joint.
@@ -155,14 +156,14 @@ pub struct Path {
 
 /// The primitives of a twin. `seen` is by the joint's id; a joint that is not in it has neither hands nor verdict.
 #[must_use]
-pub fn of(twin: &Twin, seen: &BTreeMap<&str, Seen>) -> Primitives {
+pub fn of(twin: &Twin, seen: &BTreeMap<&str, Seen>, config: &config::Primitives) -> Primitives {
     let system = System::default();
     let nothing = Seen::default();
     let (mut joints, mut left_out) = (Vec::new(), Vec::new());
     for (index, part) in twin.furniture.iter().map(|f| &f.part).enumerate() {
-        let straight = grasp::contact(part);
-        let contact = grasp::tilted(&straight, clear::tilt(twin, index, &straight));
-        match of_joint(part, contact, seen.get(part.id.as_str()).unwrap_or(&nothing), &system) {
+        let straight = grasp::contact(part, config);
+        let contact = grasp::tilted(&straight, clear::tilt(twin, index, &straight, config));
+        match of_joint(part, contact, seen.get(part.id.as_str()).unwrap_or(&nothing), &system, config) {
             Some(joint) => joints.push(joint),
             None => left_out.push(LeftOut {
                 id: part.id.clone(),
@@ -177,21 +178,27 @@ pub fn of(twin: &Twin, seen: &BTreeMap<&str, Seen>) -> Primitives {
         frame: "world of the twin, +Z up; metres, radians, seconds; positive motion opens; poses are world_from_gripper: z \
                 approaches, x is the way that fingers close, the origin is between the fingertips"
             .to_owned(),
-        standoff_m: grasp::STANDOFF_M,
+        standoff_m: config.standoff_m,
         dmp: system,
         joints,
         left_out,
     }
 }
 
-fn of_joint(part: &Part, contact: Contact, seen: &Seen, system: &System) -> Option<JointPrimitives> {
+fn of_joint(
+    part: &Part,
+    contact: Contact,
+    seen: &Seen,
+    system: &System,
+    config: &config::Primitives,
+) -> Option<JointPrimitives> {
     let (joint, phi) = (&part.joint, part.joint.articulation);
     let grasp = grasp::pose(&contact);
     let held = Held { phi, grasp, turn: contact.tilt_rad[1] - contact.tilt_rad[0], upper: joint.upper };
-    let back = Pose::from_parts((contact.approach * -grasp::STANDOFF_M).into(), nalgebra::UnitQuaternion::identity());
+    let back = Pose::from_parts((contact.approach * -config.standoff_m).into(), nalgebra::UnitQuaternion::identity());
     let [opening, closing] =
         [(Action::Open, 0.0, joint.upper), (Action::Close, joint.upper, 0.0)].map(|(action, from, to)| {
-            let timing = timing::timing(part, &seen.hands, action);
+            let timing = timing::timing(part, &seen.hands, action, config);
             motion(&held, [from, to], timing, system)
         });
     Some(JointPrimitives {

@@ -3,22 +3,15 @@
 use serde::{Deserialize, Serialize};
 
 use crate::articulation::Action;
+use crate::config;
 use crate::hands::Trajectory;
-use crate::inference::openings;
+use crate::inference::{ENDS, openings};
 use crate::math::stats;
 use crate::twin::Part;
 
-/// Fastest that a grip goes where no hand was recorded, m/s: half of what people do.
-const CALM_M_PER_S: f64 = 0.4;
-/// A motion is no shorter and no longer than this, seconds: a hand that was seen for a moment tells no speed.
-const SECS: [f64; 2] = [0.5, 20.0];
-/// A clip tells its timing where it goes through this share of the part's range, at least.
-const LEAST_SHARE: f64 = 0.15;
-/// Skews that are tried; 1 is a minimum jerk, below it begins fast, above it begins slowly.
-const SKEWS: [f64; 2] = [0.7, 1.5];
-/// Steps from the first skew to the last.
+/// Numerics: steps from the first skew to the last.
 const SKEW_STEPS: u32 = 32;
-/// Share of the duration after which a minimum jerk has done a tenth of its way.
+/// Arithmetic: share of the duration after which a minimum jerk has done a tenth of its way.
 const TENTH: f64 = 0.246_636_5;
 
 /// Where a timing comes from.
@@ -55,7 +48,8 @@ pub fn progress(share: f64, skew: f64) -> f64 {
 
 /// The timing of one way through a part's range, of the clip of median duration; `hands` are all clips of the part.
 #[must_use]
-pub fn timing(part: &Part, hands: &[(String, &Trajectory)], action: Action) -> Timing {
+pub fn timing(part: &Part, hands: &[(String, &Trajectory)], action: Action, config: &config::Primitives) -> Timing {
+    let [shortest, longest] = config.secs;
     for (source, wanted) in [
         (TimingSource::Recorded, action),
         (TimingSource::Reversed, if action == Action::Open { Action::Close } else { Action::Open }),
@@ -64,29 +58,29 @@ pub fn timing(part: &Part, hands: &[(String, &Trajectory)], action: Action) -> T
         let mut told: Vec<([f64; 2], &str)> = hands
             .iter()
             .filter(|(_, hand)| hand.action == wanted)
-            .filter_map(|(clip, hand)| Some((measured(part, hand, backwards)?, clip.as_str())))
+            .filter_map(|(clip, hand)| Some((measured(part, hand, backwards, config)?, clip.as_str())))
             .collect();
         told.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]).then(a.1.cmp(b.1)));
         if let Some(([secs, skew], clip)) = told.get(told.len().saturating_sub(1) / 2) {
-            let duration_secs = secs.clamp(SECS[0], SECS[1]);
+            let duration_secs = secs.clamp(shortest, longest);
             return Timing { source, clip: Some((*clip).to_owned()), duration_secs, skew: *skew };
         }
     }
     let way = part.joint.articulation.lever(&part.handle) * part.joint.upper;
-    // A minimum jerk is 15/8 as fast as its mean at its fastest.
-    let duration_secs = (1.875 * way / CALM_M_PER_S).clamp(1.0, SECS[1]);
+    // Arithmetic: a minimum jerk is 15/8 as fast as its mean at its fastest.
+    let duration_secs = (1.875 * way / config.calm_m_per_s).clamp(config.calm_secs, longest);
     Timing { source: TimingSource::MinimumJerk, clip: None, duration_secs, skew: 1.0 }
 }
 
 /// Seconds that a hand would need for the whole range at its speed, and its skew; `None` where it tells neither.
-fn measured(part: &Part, hand: &Trajectory, backwards: bool) -> Option<[f64; 2]> {
+fn measured(part: &Part, hand: &Trajectory, backwards: bool, config: &config::Primitives) -> Option<[f64; 2]> {
     if hand.samples.is_empty() {
         return None;
     }
     let raw = openings(&part.joint.articulation, &hand.closed_grip(), &hand.positions());
-    let (low, high) = (stats::quantile(&raw, 0.03)?, stats::quantile(&raw, 0.97)?);
+    let (low, high) = (stats::quantile(&raw, ENDS)?, stats::quantile(&raw, 1.0 - ENDS)?);
     let way = high - low;
-    if !way.is_finite() || way < LEAST_SHARE * part.joint.upper {
+    if !way.is_finite() || way < config.told_share * part.joint.upper {
         return None;
     }
     // Time and share of the way in the order of the motion that is wanted, which goes from 0 to 1.
@@ -111,7 +105,7 @@ fn measured(part: &Part, hand: &Trajectory, backwards: bool) -> Option<[f64; 2]>
     if end - begin < 1e-3 {
         return None;
     }
-    let skew = skew_of((middle - begin) / (end - begin));
+    let skew = skew_of((middle - begin) / (end - begin), config.skews);
     let [u, _, v] = marks(skew);
     Some([(end - begin) / (v - u) * part.joint.upper / way, skew])
 }
@@ -131,8 +125,8 @@ fn marks(skew: f64) -> [f64; 3] {
 }
 
 /// The skew whose half of the way lies as given between its tenth and its nine tenths.
-fn skew_of(middle: f64) -> f64 {
-    let of = |step: u32| SKEWS[0] + (SKEWS[1] - SKEWS[0]) * f64::from(step) / f64::from(SKEW_STEPS);
+fn skew_of(middle: f64, [least, most]: [f64; 2]) -> f64 {
+    let of = |step: u32| least + (most - least) * f64::from(step) / f64::from(SKEW_STEPS);
     let off = |skew: f64| {
         let [u, m, v] = marks(skew);
         ((m - u) / (v - u) - middle).abs()
@@ -157,7 +151,7 @@ mod tests {
         for skew in [0.8, 1.0, 1.3] {
             // Over two thirds of the range: the whole takes half as long again.
             let open = hand(&part, Action::Open, 2.0, skew, part.joint.upper / 1.5);
-            let told = timing(&part, &[("a".to_owned(), &open)], Action::Open);
+            let told = timing(&part, &[("a".to_owned(), &open)], Action::Open, &config::Primitives::default());
             assert_eq!((told.source, told.clip.as_deref()), (TimingSource::Recorded, Some("a")));
             assert!((told.duration_secs - 3.0).abs() < 0.3, "{skew}: {told:?}");
             assert!((told.skew - skew).abs() < 0.15, "{skew}: {told:?}");
@@ -171,9 +165,9 @@ mod tests {
             [1.0, 5.0, 2.0].iter().map(|s| hand(&part, Action::Close, *s, 1.3, part.joint.upper)).collect();
         let named: Vec<(String, &Trajectory)> =
             ["a", "b", "c"].iter().zip(&hands).map(|(n, h)| ((*n).to_owned(), h)).collect();
-        let close = timing(&part, &named, Action::Close);
+        let close = timing(&part, &named, Action::Close, &config::Primitives::default());
         assert_eq!((close.source, close.clip.as_deref()), (TimingSource::Recorded, Some("c")));
-        let open = timing(&part, &named, Action::Open);
+        let open = timing(&part, &named, Action::Open, &config::Primitives::default());
         assert_eq!((open.source, open.clip.as_deref()), (TimingSource::Reversed, Some("c")));
         // What begins slowly ends slowly backwards, which is to begin fast.
         assert!(close.skew > 1.1 && open.skew < 0.95, "{close:?} {open:?}");
@@ -183,9 +177,9 @@ mod tests {
     #[test]
     fn without_a_hand_it_is_calm() {
         let part = door();
-        let told = timing(&part, &[], Action::Open);
+        let told = timing(&part, &[], Action::Open, &config::Primitives::default());
         let way = part.joint.articulation.lever(&part.handle) * part.joint.upper;
         assert_eq!((told.source, told.skew, told.clip), (TimingSource::MinimumJerk, 1.0, None));
-        assert!((told.duration_secs - 1.875 * way / CALM_M_PER_S).abs() < 1e-9);
+        assert!((told.duration_secs - 1.875 * way / config::Primitives::default().calm_m_per_s).abs() < 1e-9);
     }
 }

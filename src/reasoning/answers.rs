@@ -107,7 +107,7 @@ const FURNITURE_FIELDS: &[&str] = &["furniture", "furniture name", "object", "fi
 const MOTION_FIELDS: &[&str] = &["motion", "motion type", "type", "movement", "joint", "joint type", "bewegung"];
 const ANSWER_FIELDS: &[&str] = &["answer", "final answer", "response", "output", "result", "antwort"];
 
-/// Longer texts are cut: an answer is a line.
+/// Format: longer texts are cut, an answer is a line.
 const LONGEST: usize = 4000;
 
 /// Reads "cupboard:rotation" and whatever models make of it.
@@ -228,6 +228,7 @@ fn kind(text: &str) -> Option<JointKind> {
 
 /// A name of furniture: a few words, none of which says that there is none.
 fn name(text: &str) -> Option<String> {
+    /// Format: words of a name.
     const MOST_WORDS: usize = 3;
     let words: Vec<&str> = text.split(' ').collect();
     let fits = words.len() <= MOST_WORDS

@@ -4,8 +4,9 @@ use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
 use crate::error::{Error, Result};
+use crate::math::segment_distance;
 use crate::recording::Grid;
-use crate::vlm::Picture;
+use crate::vlm::EncodedPicture;
 
 /// A colour image.
 pub type Image = Grid<[u8; 3]>;
@@ -13,12 +14,14 @@ pub type Image = Grid<[u8; 3]>;
 /// A line to draw, pixels (u, v); integer coordinates are pixel centres. Its number is its place in the list, from 1.
 pub type Mark = [[f64; 2]; 2];
 
+/// Format: colour of lines.
 const YELLOW: [u8; 3] = [255, 214, 0];
+/// Format: colour of numbers.
 const WHITE: [u8; 3] = [255; 3];
-/// Around lines and numbers, so that they stand out from white furniture too.
+/// Format: colour around lines and numbers, so that they stand out from white furniture too.
 const DARK: [u8; 3] = [20, 20, 20];
 
-/// Digits of 5 x 7 cells, a row a byte.
+/// Format: digits of 5 x 7 cells, a row a byte.
 const DIGITS: [[u8; 7]; 10] = [
     [0b01110, 0b10001, 0b10011, 0b10101, 0b11001, 0b10001, 0b01110],
     [0b00100, 0b01100, 0b00100, 0b00100, 0b00100, 0b00100, 0b01110],
@@ -144,7 +147,8 @@ pub fn shrunk(image: &Image, longest: usize) -> Image {
 ///
 /// # Errors
 /// Where it cannot be encoded, which would be a bug.
-pub fn jpeg(image: &Image) -> Result<Picture> {
+pub fn jpeg(image: &Image) -> Result<EncodedPicture> {
+    /// Format: of JPEG, of 100.
     const QUALITY: u8 = 90;
     let size = [image.width as u32, image.height as u32];
     let raw: Vec<u8> = image.data.iter().flatten().copied().collect();
@@ -152,7 +156,7 @@ pub fn jpeg(image: &Image) -> Result<Picture> {
     JpegEncoder::new_with_quality(&mut bytes, QUALITY)
         .write_image(&raw, size[0], size[1], ExtendedColorType::Rgb8)
         .map_err(|e| Error::Export(format!("a picture for the language model: {e}")))?;
-    Ok(Picture { bytes, mime: "image/jpeg", size })
+    Ok(EncodedPicture { bytes, mime: "image/jpeg", size })
 }
 
 /// Colours the pixels within `half` of a line.
@@ -163,13 +167,9 @@ fn stroke(image: &mut Image, mark: &Mark, half: f64, color: [u8; 3]) {
         let high = (a[k].max(b[k]) + half).ceil().clamp(-1.0, size as f64 - 1.0) + 1.0;
         low..high as usize
     };
-    let d = [b[0] - a[0], b[1] - a[1]];
-    let length2 = (d[0] * d[0] + d[1] * d[1]).max(1e-12);
     for y in range(1, image.height) {
         for x in range(0, image.width) {
-            let p = [x as f64 - a[0], y as f64 - a[1]];
-            let t = ((p[0] * d[0] + p[1] * d[1]) / length2).clamp(0.0, 1.0);
-            if (p[0] - t * d[0]).hypot(p[1] - t * d[1]) <= half {
+            if segment_distance([x as f64, y as f64], a, b) <= half {
                 image.data[y * image.width + x] = color;
             }
         }
@@ -178,7 +178,7 @@ fn stroke(image: &mut Image, mark: &Mark, half: f64, color: [u8; 3]) {
 
 /// A place beside each line for its number: inside the image, on no other number, on as few lines as can be.
 fn places(image: &Image, marks: &[Mark], style: &Style) -> Vec<Area> {
-    // Near the middle of the line first.
+    /// Format: places along a line that are tried for its number, near the middle first.
     const ALONG: [f64; 7] = [0.5, 0.35, 0.65, 0.2, 0.8, 0.05, 0.95];
     let mut placed: Vec<Area> = Vec::new();
     for (i, [a, b]) in marks.iter().enumerate() {

@@ -1,12 +1,17 @@
 //! The two questions of §3.3 and §A.6: how does the part move, and which of the lines could be its hinge?
 //!
 //! Whoever answers does so through [`Reasoner`]. [`heuristic::Geometric`] answers without any network (the paper's row
-//! "w/o GPT-4o"); its absence of a language model is a normal mode of work. [`words::Asking`] asks one as well, and adds
+//! "w/o GPT-4o"); its absence of a language model is a normal mode of work. [`asking::Asking`] asks one as well (feature `prompts`), and adds
 //! what it says to the evidence.
 
 pub mod answers;
+#[cfg(feature = "prompts")]
+pub mod asking;
 pub mod heuristic;
 pub mod marks;
+#[cfg(feature = "prompts")]
+pub mod naming;
+#[cfg(feature = "prompts")]
 pub mod prompts;
 pub mod words;
 
@@ -32,7 +37,7 @@ pub struct Question<'a> {
     pub grip: Point,
     /// All axes that the part could have.
     pub candidates: &'a [AxisCandidate],
-    /// For each candidate how well it explains the depth of the open state, in nats (see [`crate::geometry::sights::agreement`]).
+    /// For each candidate how well it explains the depth of the open state, in nats (see [`crate::part::likelihood::log_likelihood`]).
     pub agreement: &'a [f64],
     /// Width and height of the moving part and the grip's place in it (-0.5..0.5 to the right and up), where known.
     pub part: Option<PartShape>,
@@ -111,7 +116,7 @@ pub trait Reasoner: Sync {
     /// What a language model says about a clip; `None` where none is asked.
     ///
     /// # Errors
-    /// What must end the run: see [`crate::vlm::Model::ask`].
+    /// What must end the run: see [`crate::vlm::LanguageModel::ask`].
     fn words(&self, _sight: &words::Sight) -> Result<Option<words::Words>> {
         Ok(None)
     }

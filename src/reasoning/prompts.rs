@@ -46,6 +46,15 @@ pub struct AxisChoice<'a> {
     pub narration: &'a str,
 }
 
+/// What the template for a clip's name is filled with.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct NameQuestion<'a> {
+    /// Pictures shown.
+    pub count: usize,
+    /// Names of furniture to choose from ("drawer, fridge").
+    pub names: &'a str,
+}
+
 /// A template: its file, its built-in text, and the variables that it may use.
 struct Template {
     file: &'static str,
@@ -68,9 +77,14 @@ const AXIS_CHOICE: Template = Template {
     built_in: include_str!("../../templates/axis_choice.txt"),
     variables: &["count", "furniture", "narration", "numbers"],
 };
-const ALL: [&Template; 3] = [&MOTION_TYPE, &SUMMARY, &AXIS_CHOICE];
+const NAMING: Template = Template {
+    file: "naming.txt",
+    built_in: include_str!("../../templates/naming.txt"),
+    variables: &["count", "names"],
+};
+const ALL: [&Template; 4] = [&MOTION_TYPE, &SUMMARY, &AXIS_CHOICE, &NAMING];
 
-/// The three prompts.
+/// The four prompts.
 #[derive(Debug)]
 pub struct Prompts {
     environment: Environment<'static>,
@@ -85,15 +99,15 @@ impl Prompts {
         Self::with(|template| Ok(template.built_in.to_owned()))
     }
 
-    /// Those of a folder's `motion_type.txt`, `summary.txt` and `axis_choice.txt` that are there, the built-in ones for the
-    /// rest.
+    /// Those of a folder's `motion_type.txt`, `summary.txt`, `axis_choice.txt` and `naming.txt` that are there, the built-in
+    /// ones for the rest.
     ///
     /// # Errors
     /// Where none is there, or one cannot be used: its syntax, or a variable that it will not get.
     pub fn read(dir: &Path) -> Result<Self> {
         if !ALL.iter().any(|t| dir.join(t.file).is_file()) {
-            let message =
-                "holds no motion_type.txt, summary.txt or axis_choice.txt; start from the project's templates/";
+            let message = "holds no motion_type.txt, summary.txt, axis_choice.txt or naming.txt; start from the project's \
+                           templates/";
             return Err(Error::Io { path: dir.to_owned(), message: message.to_owned() });
         }
         Self::with(|template| {
@@ -152,6 +166,14 @@ impl Prompts {
         self.render(&AXIS_CHOICE, values)
     }
 
+    /// The question for the furniture that a clip shows, and for what is done to it.
+    ///
+    /// # Errors
+    /// Where the template cannot be filled.
+    pub fn naming(&self, values: &NameQuestion) -> Result<String> {
+        self.render(&NAMING, values)
+    }
+
     fn render(&self, template: &Template, values: impl Serialize) -> Result<String> {
         self.environment
             .get_template(template.file)
@@ -180,6 +202,7 @@ mod tests {
             (&MOTION_TYPE, names(MotionType::default())),
             (&SUMMARY, names(Summary::default())),
             (&AXIS_CHOICE, names(AxisChoice::default())),
+            (&NAMING, names(NameQuestion::default())),
         ] {
             let parsed = prompts.environment.get_template(template.file).unwrap();
             let mut used: Vec<String> = parsed.undeclared_variables(false).into_iter().collect();
@@ -204,6 +227,9 @@ mod tests {
         assert!(text.contains("\n1. drawer:translation\n2. no answer\n"), "{text}");
         let one = AxisChoice { count: 1, numbers: "1", ..AxisChoice::default() };
         assert!(prompts.axis_choice(&one).unwrap().contains("1 straight line is drawn"));
+        let text = prompts.naming(&NameQuestion { count: 4, names: "drawer, fridge" }).unwrap();
+        assert!(text.contains("These 4 pictures") && text.contains("\ndrawer, fridge.\n"), "{text}");
+        assert!(text.contains(r#"{"verb": "open", "noun": "cupboard""#), "{text}");
         // What a narration says is text, whatever it looks like.
         let text = prompts.axis_choice(&AxisChoice { narration: "{{ count }} <b>", ..one }).unwrap();
         assert!(text.contains("\"{{ count }} <b>\""), "{text}");

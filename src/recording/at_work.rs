@@ -68,15 +68,9 @@ mod tests {
             files: Default::default(),
         };
         let recording = Recording {
-            name: String::new(),
-            dir: std::path::PathBuf::new(),
-            camera: Camera { width: 4, height: 3, fx: 3.0, fy: 3.0, cx: 1.5, cy: 1.0 },
             frames: (0..10).map(frame).collect(),
             clips: vec![clip("a", 2, 5), clip("b", 4, 7), clip("remark", 9, 9)],
-            hands: Vec::new(),
-            labels: Default::default(),
-            reconstruction: Vec::new(),
-            depth_factors: Default::default(),
+            ..Recording::empty(Camera { width: 4, height: 3, fx: 3.0, fy: 3.0, cx: 1.5, cy: 1.0 })
         };
         let at_work = AtWork::of(&recording);
         let any: Vec<usize> = (0..12).filter(|&f| at_work.any(f)).collect();

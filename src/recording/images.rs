@@ -4,8 +4,9 @@ use std::path::Path;
 
 use image::{DynamicImage, ImageDecoder, ImageReader};
 
-use super::{Camera, Grid};
+use super::{Camera, Grid, sniff};
 use crate::error::{Error, Result};
+use crate::json::POINTER;
 use crate::math::{Point, Pose};
 
 /// Half-width of the square that a point of a reconstruction covers in an image, metres: half of the paper's voxel.
@@ -43,8 +44,11 @@ fn decode(path: &Path, camera: &Camera) -> Result<DynamicImage> {
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(MAX_IMAGE_BYTES);
     reader.limits(limits);
-    let wrong = |e: image::ImageError| {
-        Error::format(path, "image", format!("cannot be decoded ({e}); export this frame again or delete the file"))
+    let wrong = |e: image::ImageError| match sniff::is_pointer(path) {
+        true => Error::format(path, "image", POINTER.1),
+        false => {
+            Error::format(path, "image", format!("cannot be decoded ({e}); export this frame again or delete the file"))
+        }
     };
     let decoder = reader.into_decoder().map_err(wrong)?;
     // Before anything of the size that a header claims is decoded.
@@ -95,6 +99,15 @@ pub fn classes(path: &Path, camera: &Camera) -> Result<Grid<u8>> {
 /// Luma of any colour image.
 pub fn grey(path: &Path, camera: &Camera) -> Result<Grid<u8>> {
     Ok(grid(camera, decode(path, camera)?.into_luma8().into_raw()))
+}
+
+/// Luma of colours, as of an image that is read.
+#[must_use]
+pub fn luma(rgb: &Grid<[u8; 3]>) -> Grid<u8> {
+    let image = image::RgbImage::from_fn(rgb.width as u32, rgb.height as u32, |x, y| {
+        image::Rgb(rgb.get(x as usize, y as usize).unwrap_or_default())
+    });
+    Grid { width: rgb.width, height: rgb.height, data: DynamicImage::ImageRgb8(image).into_luma8().into_raw() }
 }
 
 /// Any colour image as RGB.

@@ -1,15 +1,21 @@
 //! What was seen: the only input of every step. Reading is here and in `import`; images are decoded when asked for.
 //!
-//! The layout on disk is described in `docs/recording-format.md`.
+//! A recording is a folder ([`Recording::open`]; `docs/recording-format.md` has its layout), or what a program holds
+//! ([`Recording::from_memory`]); its pictures come from whatever implements [`Frames`].
 
 pub mod at_work;
+mod checks;
 mod columns;
 pub mod conventions;
 mod folder;
+pub mod frames;
 pub mod grid;
 pub mod images;
+mod memory;
 pub mod narration;
 pub mod npy;
+pub mod origin;
+pub mod people;
 mod read;
 pub(crate) mod reconstruction;
 pub mod segments;
@@ -17,16 +23,20 @@ pub mod sketch;
 mod sniff;
 pub(crate) mod tables;
 pub mod trajectory;
+pub mod videos;
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
 use crate::math::{Point, Pose, Vector};
 pub use at_work::AtWork;
+pub use frames::{FolderFrames, Frames, MemoryFrames, Source};
 pub use grid::Grid;
+pub use memory::{MemoryFrame, MemoryRecording};
+pub use videos::{Video, Videos};
 
 /// Class of a hand's pixel in a mask.
 pub const HAND_CLASS: u8 = 255;
@@ -68,12 +78,12 @@ impl Camera {
     }
 }
 
-/// Files of one frame; each is optional.
+/// Names of one frame's pictures; each is optional. Of a folder they are paths, else what its [`Frames`] calls them.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FrameFiles {
     /// RGB image.
     pub rgb: Option<PathBuf>,
-    /// Depth along z, 16-bit millimetres, 0 = none.
+    /// Depth along z, 0 = none; in files 16-bit millimetres.
     pub depth: Option<PathBuf>,
     /// Normals in the camera frame, facing the camera.
     pub normals: Option<PathBuf>,
@@ -90,7 +100,7 @@ pub struct Frame {
     pub timestamp_secs: f64,
     /// Camera to world.
     pub world_from_camera: Pose,
-    /// What is on disk.
+    /// Which pictures there are.
     pub files: FrameFiles,
 }
 
@@ -176,14 +186,15 @@ impl HandSample {
     }
 }
 
-/// A recording: poses, narrations and hands in memory, images on disk.
+/// A recording: poses, narrations and hands in memory, pictures where its [`Source`] has them. It may be joined of several
+/// videos ([`videos`]).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
     /// The folder's name.
     pub name: String,
-    /// The folder.
+    /// The folder; of a recording without one `memory:NAME`, or nothing.
     pub dir: PathBuf,
-    /// Intrinsics.
+    /// Intrinsics; of a recording that was joined those of its first video ([`Recording::camera_of`]).
     pub camera: Camera,
     /// Frames in time order.
     pub frames: Vec<Frame>,
@@ -197,20 +208,59 @@ pub struct Recording {
     pub reconstruction: Vec<Point>,
     /// What depth files are multiplied by when they are read.
     pub depth_factors: DepthFactors,
+    /// What it was joined of.
+    pub videos: Videos,
+    /// What cannot be worked with and costs only itself.
+    pub left_out: LeftOut,
+    /// Who has the pictures; of a recording that was joined each video has its own ([`Recording::source_of`]).
+    pub source: Source,
 }
 
-/// What each frame's depth has to be multiplied by to be metric.
+/// What of a recording's folder cannot be worked with, while the rest can.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct LeftOut {
+    /// Clips, each with what is wrong with it. Their names are unique in the recording, their frames are in the video.
+    pub clips: Vec<(Clip, String)>,
+    /// All else, one sentence each, for people.
+    pub notes: Vec<String>,
+}
+
+/// What each frame's depth has to be multiplied by to be metric, and how noisy it is then.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DepthFactors {
     /// Frames whose factor is known.
     pub by_frame: BTreeMap<usize, f64>,
     /// The factor of all other frames.
     pub other: f64,
+    /// How far depth is off after that; `None` where too little is seen twice to tell it.
+    #[serde(default)]
+    pub noise: Option<DepthNoise>,
 }
 
 impl Default for DepthFactors {
     fn default() -> Self {
-        Self { by_frame: BTreeMap::new(), other: 1.0 }
+        Self { by_frame: BTreeMap::new(), other: 1.0, noise: None }
+    }
+}
+
+/// The noise law of a recording's depth: the standard deviation of a surface's place across itself, as a frame's depth has it,
+/// grows evenly with the distance from the camera. All of `part` takes it from [`DepthFactors::noise`], which
+/// `geometry::depth_scale` measures on each recording; where it cannot, `part.assumed_floor_m` and `part.assumed_per_m` of the config
+/// stand in. The scale of depth, 3D lines and alignments of two recordings have limits of their own in the config
+/// (`geometry.scales`, `geometry.tracks`, `alignment.judging`).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct DepthNoise {
+    /// At the camera, metres.
+    pub floor_m: f64,
+    /// So much more for every metre of distance, metres.
+    pub per_m: f64,
+}
+
+impl DepthNoise {
+    /// Standard deviation of what is seen at a distance `z`, metres.
+    #[must_use]
+    pub fn std_m(&self, z: f64) -> f64 {
+        self.floor_m + self.per_m * z
     }
 }
 
@@ -222,13 +272,42 @@ impl DepthFactors {
     }
 }
 
+/// What shows where surfaces are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Surfaces {
+    /// Nothing: there are poses and hands alone.
+    Nothing,
+    /// Images or a detector's segments, of which lines in space can be told.
+    Images,
+    /// Points with holes between them: of structure from motion, or a semi-dense map. What lies behind a surface shows
+    /// through it, so that they do not stand in for depth.
+    Points,
+    /// Depth, or a reconstruction without holes, which stands in for it.
+    Depth,
+}
+
 impl Recording {
+    /// The best that the recording has of [`Surfaces`]. Looks at every point of a reconstruction: ask once.
+    #[must_use]
+    pub fn surfaces(&self) -> Surfaces {
+        let any = |has: fn(&FrameFiles) -> bool| self.frames.iter().any(|f| has(&f.files));
+        if any(|f| f.depth.is_some()) || reconstruction::is_dense(&self.reconstruction) {
+            Surfaces::Depth
+        } else if !self.reconstruction.is_empty() {
+            Surfaces::Points
+        } else if any(|f| f.rgb.is_some() || f.segments.is_some()) {
+            Surfaces::Images
+        } else {
+            Surfaces::Nothing
+        }
+    }
+
     /// Reads and checks a folder. All faults are reported at once; a file that lies elsewhere, by a link or by the path that
     /// `cameras.json` gives, is one.
     ///
     /// # Errors
     /// Where the folder is no recording that can be used.
-    pub fn open(dir: &std::path::Path) -> Result<Self> {
+    pub fn open(dir: &Path) -> Result<Self> {
         read::open(dir, false, true)
     }
 
@@ -237,7 +316,7 @@ impl Recording {
     ///
     /// # Errors
     /// As [`Self::open`], but for hands out of reach.
-    pub fn open_unjudged(dir: &std::path::Path, follow_links: bool) -> Result<Self> {
+    pub fn open_unjudged(dir: &Path, follow_links: bool) -> Result<Self> {
         read::open(dir, follow_links, false)
     }
 
@@ -245,7 +324,7 @@ impl Recording {
     ///
     /// # Errors
     /// As [`Self::open`].
-    pub fn open_following_links(dir: &std::path::Path) -> Result<Self> {
+    pub fn open_following_links(dir: &Path) -> Result<Self> {
         read::open(dir, true, true)
     }
 
@@ -276,11 +355,12 @@ impl Recording {
 
     /// The same without the frame's factor.
     pub fn depth_as_read(&self, frame: usize) -> Result<Option<Grid<f32>>> {
-        let depth = self.read(frame, |f| f.depth.as_ref(), images::depth)?;
-        if depth.is_some() || self.reconstruction.is_empty() {
+        let depth = self.read(frame, |f| f.depth.as_ref(), |from, name, camera| from.depth(name, camera))?;
+        if depth.is_some() || self.reconstruction_of(frame).is_empty() {
             return Ok(depth);
         }
-        Ok(self.frames.get(frame).map(|f| images::splat(&self.reconstruction, &f.world_from_camera, &self.camera)))
+        let (points, camera) = (self.reconstruction_of(frame), self.camera_of(frame));
+        Ok(self.frames.get(frame).map(|f| images::splat(points, &f.world_from_camera, camera)))
     }
 
     /// What a frame's depth is multiplied by. A reconstruction is in the world already: its factor is 1.
@@ -293,32 +373,40 @@ impl Recording {
     /// Whether a frame has depth: its own, or the reconstruction's.
     #[must_use]
     pub fn has_depth(&self, frame: usize) -> bool {
-        self.frames.get(frame).is_some_and(|f| f.files.depth.is_some()) || !self.reconstruction.is_empty()
+        self.frames.get(frame).is_some_and(|f| f.files.depth.is_some()) || !self.reconstruction_of(frame).is_empty()
     }
 
     /// Mask classes. `None` where the frame has no mask file.
     pub fn mask(&self, frame: usize) -> Result<Option<Grid<u8>>> {
-        self.read(frame, |f| f.mask.as_ref(), images::classes)
+        let mut mask = self.read(frame, |f| f.mask.as_ref(), |from, name, camera| from.mask(name, camera))?;
+        let classes = self.classes_of(frame);
+        if let Some(mask) = mask.as_mut().filter(|_| !classes.is_empty()) {
+            for class in &mut mask.data {
+                *class = classes.get(usize::from(*class)).copied().unwrap_or(*class);
+            }
+        }
+        Ok(mask)
     }
 
     /// Grey image. `None` where the frame has no image file.
     pub fn grey(&self, frame: usize) -> Result<Option<Grid<u8>>> {
-        self.read(frame, |f| f.rgb.as_ref(), images::grey)
+        self.read(frame, |f| f.rgb.as_ref(), |from, name, camera| from.grey(name, camera))
     }
 
     /// Colour image. `None` where the frame has no image file.
     pub fn rgb(&self, frame: usize) -> Result<Option<Grid<[u8; 3]>>> {
-        self.read(frame, |f| f.rgb.as_ref(), images::rgb)
+        self.read(frame, |f| f.rgb.as_ref(), |from, name, camera| from.rgb(name, camera))
     }
 
     /// Unit normals in the camera frame; zero = none. `None` where the frame has no normals file.
     pub fn normals(&self, frame: usize) -> Result<Option<Grid<[f32; 3]>>> {
-        self.read(frame, |f| f.normals.as_ref(), images::normals)
+        self.read(frame, |f| f.normals.as_ref(), |from, name, camera| from.normals(name, camera))
     }
 
     /// A line detector's own segments. `None` where the frame has no such file.
     pub fn segments(&self, frame: usize) -> Result<Option<Vec<segments::Ends>>> {
-        self.frames.get(frame).and_then(|f| f.files.segments.as_deref()).map(segments::read).transpose()
+        let name = self.frames.get(frame).and_then(|f| f.files.segments.as_deref());
+        name.map(|name| self.source_of(frame).frames().segments(name)).transpose()
     }
 
     /// Frames that have the time of the frame before: a speed between the two is not to be had.
@@ -336,15 +424,16 @@ impl Recording {
         self.hands.get(first..end).unwrap_or_default()
     }
 
+    /// A picture of a frame; `None` where it has none of that kind.
     fn read<T>(
         &self,
         frame: usize,
-        file: impl Fn(&FrameFiles) -> Option<&PathBuf>,
-        decode: impl Fn(&std::path::Path, &Camera) -> Result<Grid<T>>,
+        named: impl Fn(&FrameFiles) -> Option<&PathBuf>,
+        give: impl Fn(&dyn Frames, &Path, &Camera) -> Result<Grid<T>>,
     ) -> Result<Option<Grid<T>>> {
-        match self.frames.get(frame).and_then(|f| file(&f.files)) {
-            Some(path) => decode(path, &self.camera).map(Some),
-            None => Ok(None),
-        }
+        let Some(name) = self.frames.get(frame).and_then(|f| named(&f.files)) else { return Ok(None) };
+        let camera = self.camera_of(frame);
+        let picture = give(self.source_of(frame).frames(), name, camera)?;
+        frames::sized(picture, name, camera).map(Some)
     }
 }

@@ -27,49 +27,21 @@ struct Lexicon {
     portable: Vec<String>,
     handheld: Vec<String>,
     control: Vec<String>,
-    hung: Vec<Habit>,
 }
 
-/// Names and what they are said of.
-#[derive(Debug, Deserialize)]
-struct Habit {
-    names: Vec<String>,
-    #[serde(flatten)]
-    ways: Hung,
-}
-
-/// How furniture of one name is hung: shares of all such furniture.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Hung {
-    /// Hinged at an upright edge of its front.
-    pub upright: f64,
-    /// Hinged at the front's lower edge.
-    pub bottom: f64,
-    /// Hinged at the front's upper edge.
-    pub top: f64,
-    /// Hinged at the far edge of a level face.
-    pub lid: f64,
-    /// Slides out of its front.
-    pub out: f64,
-    /// Slides to the side within its front.
-    pub aside: f64,
-    /// Slides up or down within its front.
-    pub lift: f64,
-}
-
-/// How furniture of that name is hung, where the name is known; lower case, as [`Reading::furniture`].
+/// Names of all furniture that is known, lower case: of what turns, what slides, and what is said of either. How each is hung is
+/// `priors.hung` of the config.
 #[must_use]
-pub fn hung(furniture: &str) -> Option<Hung> {
-    let said = |name: &String| same(furniture, name);
-    LEXICON.hung.iter().find(|habit| habit.names.iter().any(said)).map(|habit| habit.ways)
+pub fn furniture_names() -> Vec<&'static str> {
+    let lexicon = &*LEXICON;
+    [&lexicon.hinge, &lexicon.slide, &lexicon.generic].into_iter().flatten().map(String::as_str).collect()
 }
 
-/// Share of the furniture of a name whose moving face is level, where the name is trusted in a share `trust` of all cases; one
-/// half where nothing is known.
+/// A name of furniture as the lexicon writes it, where it knows it: lower case, singular.
 #[must_use]
-pub fn level_share(furniture: Option<&str>, trust: f64) -> f64 {
-    furniture.and_then(hung).map_or(0.5, |h| trust * h.lid + (1.0 - trust) * 0.5)
+pub fn furniture_word(said: &str) -> Option<&'static str> {
+    let said = plain(said);
+    furniture_names().into_iter().find(|name| same(&said, name))
 }
 
 /// What the words say. `None` where they say nothing.
@@ -156,7 +128,9 @@ pub fn read(clip: &Clip) -> Reading {
 #[must_use]
 pub fn without_names(recording: &Recording) -> Recording {
     let clips = recording.clips.iter().map(unnamed).collect();
-    Recording { clips, labels: Default::default(), ..recording.clone() }
+    let mut left_out = recording.left_out.clone();
+    left_out.clips.iter_mut().for_each(|(clip, _)| *clip = unnamed(clip));
+    Recording { clips, left_out, labels: Default::default(), ..recording.clone() }
 }
 
 fn unnamed(clip: &Clip) -> Clip {
@@ -268,6 +242,15 @@ mod tests {
     }
 
     #[test]
+    fn furniture_is_known_by_its_names() {
+        assert_eq!(furniture_word(" Washing Machines"), Some("washing machine"));
+        assert_eq!(furniture_word("drawers"), Some("drawer"));
+        assert_eq!(furniture_word("bottle"), None);
+        assert_eq!(furniture_word(""), None);
+        assert!(furniture_names().contains(&"door") && furniture_names().len() > 20);
+    }
+
+    #[test]
     fn the_lexicon_parses() {
         assert!(LEXICON.open.len() > 3 && LEXICON.handheld.len() > 3);
     }
@@ -346,22 +329,5 @@ mod tests {
         let [clip, verb, noun] = [(); 3].map(|()| String::new());
         let washing = Clip { clip, start_frame: 0, end_frame: 1, narration: "wash hands".to_owned(), verb, noun };
         assert_eq!(unnamed(&washing), washing);
-    }
-
-    #[test]
-    fn every_name_has_one_habit_that_is_of_its_type() {
-        let names = || LEXICON.hung.iter().flat_map(|h| h.names.iter().map(move |n| (n, h.ways)));
-        for (list, hinged) in [(&LEXICON.hinge, true), (&LEXICON.generic, true), (&LEXICON.slide, false)] {
-            for name in list {
-                assert_eq!(names().filter(|(n, _)| *n == name).count(), 1, "{name}");
-                let ways = hung(name).unwrap();
-                let turns = ways.upright + ways.bottom + ways.top + ways.lid;
-                let slides = ways.out + ways.aside + ways.lift;
-                assert!((turns + slides - 1.0).abs() < 1e-9 && (turns > slides) == hinged, "{name}: {ways:?}");
-            }
-        }
-        assert_eq!(names().count(), LEXICON.hinge.len() + LEXICON.generic.len() + LEXICON.slide.len());
-        assert!(hung("bottle").is_none() && level_share(None, 0.9) == 0.5);
-        assert!(level_share(Some("chest"), 0.9) > 0.85 && level_share(Some("drawer"), 0.9) < 0.1);
     }
 }

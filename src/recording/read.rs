@@ -1,49 +1,21 @@
 //! Reading a recording's folder and finding all that is wrong with it in one go.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Quaternion, UnitQuaternion};
 
-use super::folder::{Folder, MAX_COORDINATE};
+use super::checks::{self, Faults};
+use super::folder::Folder;
 use super::tables::{self, CamerasFile, ClipsFile, FrameEntry, HandsFile, TIP_JOINTS};
-use super::{Camera, Clip, Frame, FrameFiles, HandSample, Recording, Side, reconstruction};
+use super::{Camera, Frame, FrameFiles, HandSample, LeftOut, Recording, Side, reconstruction};
 use crate::error::{Error, Result};
 use crate::json;
-use crate::math::{Point, Pose, Vector, stats};
+use crate::math::{Point, Pose, Vector};
 
 /// The longest line of a CSV or log file.
 pub(super) const MAX_LINE_BYTES: u64 = 64 << 10;
-/// Faults of one kind that are listed before "and n more".
-const MAX_LISTED: usize = 5;
-
-/// Faults, with a bound on how many of one kind are spelled out.
-#[derive(Default)]
-struct Faults {
-    list: Vec<String>,
-    counts: BTreeMap<&'static str, usize>,
-}
-
-impl Faults {
-    fn add(&mut self, kind: &'static str, text: String) {
-        let count = self.counts.entry(kind).or_default();
-        *count += 1;
-        if *count <= MAX_LISTED {
-            self.list.push(text);
-        }
-    }
-
-    fn finish(mut self, dir: &Path) -> Result<()> {
-        for (kind, count) in &self.counts {
-            if *count > MAX_LISTED {
-                self.list.push(format!("{kind}: {} more like these", count - MAX_LISTED));
-            }
-        }
-        if self.list.is_empty() { Ok(()) } else { Err(Error::Recording { path: dir.to_owned(), faults: self.list }) }
-    }
-}
 
 /// The tables of a recording; images are named by frame.
 const TABLES: [&str; 7] = [
@@ -78,9 +50,11 @@ pub(super) fn open(dir: &Path, follow_links: bool, judge: bool) -> Result<Record
     let clips = if told.exists() { json::read(&told)? } else { ClipsFile { clips: Vec::new() } };
     let camera = check_camera(&cameras, &mut faults);
     let frames = frames(&folder, &cameras, &mut faults);
-    check_clips(&clips.clips, frames.len(), &mut faults);
-    let hands = hands(dir, frames.len(), &mut faults)?;
-    check_hands(&hands, &frames, judge, &mut faults);
+    let mut left_out = LeftOut::default();
+    let clips = checks::usable_clips(clips.clips, frames.len(), "clips.json", &mut left_out, &mut faults);
+    let (name, hands) = hands(dir, &mut faults)?;
+    let hands = checks::usable_hands(hands, frames.len(), name, &mut left_out, &mut faults);
+    checks::hands(&hands, &frames, ["hands.json / fingertips.csv", if judge { REACH } else { "" }], &mut faults);
     let labels = tables::labels(dir)?;
     let reconstruction = reconstruction::read(dir)?;
     faults.finish(dir)?;
@@ -90,34 +64,17 @@ pub(super) fn open(dir: &Path, follow_links: bool, judge: bool) -> Result<Record
         .ok()
         .and_then(|d| d.file_name().map(|n| n.to_string_lossy().into_owned()))
         .unwrap_or_else(|| "recording".to_owned());
-    Ok(Recording {
-        name,
-        dir: dir.to_owned(),
-        camera,
-        frames,
-        clips: clips.clips,
-        hands,
-        labels,
-        reconstruction,
-        depth_factors: super::DepthFactors::default(),
-    })
+    let dir = dir.to_owned();
+    Ok(Recording { name, dir, frames, clips, hands, labels, reconstruction, left_out, ..Recording::empty(camera) })
 }
 
+/// What to do about hands out of the head's reach.
+const REACH: &str =
+    "hands and camera poses must share one world frame and one unit (metres); paws import --check looks for the cause";
+
 fn check_camera(file: &CamerasFile, faults: &mut Faults) -> Camera {
-    let Camera { width, height, fx, fy, cx, cy } =
-        Camera { width: file.width, height: file.height, fx: file.fx, fy: file.fy, cx: file.cx, cy: file.cy };
-    // 64 megapixels: twice the largest camera that anyone wears, and an image that fits in memory many times.
-    if width == 0 || height == 0 || width.saturating_mul(height) > 64 << 20 {
-        faults.add("size", format!("cameras.json: image size {width} x {height} is not a camera's"));
-    }
-    // A thousand image widths see a thousandth of a radian: no lens of a head-worn camera, and far from an overflow.
-    let widest = 1e3 * width.max(height) as f64;
-    if ![fx, fy].iter().all(|f| *f > 1.0 && *f < widest) {
-        faults.add("focal", format!("cameras.json: fx {fx}, fy {fy} must be focal lengths in pixels"));
-    }
-    if ![cx, cy].iter().all(|c| c.abs() < widest) {
-        faults.add("centre", format!("cameras.json: cx {cx}, cy {cy} must be pixels on the image or near it"));
-    }
+    let camera = Camera { width: file.width, height: file.height, fx: file.fx, fy: file.fy, cx: file.cx, cy: file.cy };
+    checks::camera(&camera, "cameras.json", faults);
     if let Some(units) = &file.units
         && !["m", "metre", "metres", "meter", "meters"].contains(&units.as_str())
     {
@@ -135,7 +92,7 @@ fn check_camera(file: &CamerasFile, faults: &mut Faults) -> Camera {
                 .add("distortion", "cameras.json: distorted images are not supported; undistort them first".to_owned());
         }
     }
-    Camera { width, height, fx, fy, cx, cy }
+    camera
 }
 
 fn frames(folder: &Folder, file: &CamerasFile, faults: &mut Faults) -> Vec<Frame> {
@@ -149,11 +106,8 @@ fn frames(folder: &Folder, file: &CamerasFile, faults: &mut Faults) -> Vec<Frame
         if entry.frame != index {
             faults.add("index", format!("{place}: is entry {index}; frames must be numbered 0, 1, 2, ... in order"));
         }
-        check_time(entry.timestamp, &mut last, &place, faults);
-        if !entry.position.iter().all(|x| x.abs() < MAX_COORDINATE) {
-            let fault = "position is not finite or overflows; drop the frame or interpolate its pose";
-            faults.add("position", format!("{place}: {fault}"));
-        }
+        checks::time(entry.timestamp, &mut last, &place, faults);
+        checks::position(&entry.position, &place, faults);
         let [w, x, y, z] = entry.rotation_wxyz;
         let q = Quaternion::new(w, x, y, z);
         if !q.norm().is_finite() || (q.norm() - 1.0).abs() > 1e-2 {
@@ -171,23 +125,8 @@ fn frames(folder: &Folder, file: &CamerasFile, faults: &mut Faults) -> Vec<Frame
             files: files(folder, entry, index, &place, faults),
         });
     }
-    check_scale(&out, faults);
+    checks::scale(&out, "cameras.json", faults);
     out
-}
-
-/// Times do not go back. Two frames of one time are told by whoever opens the recording ([`Recording::repeated_times`]).
-fn check_time(time: f64, last: &mut f64, place: &str, faults: &mut Faults) {
-    // Between two frames of one recording; what is further apart was taken by two clocks.
-    const DAY_SECS: f64 = 86_400.0;
-    if !time.is_finite() || time < *last {
-        faults.add("time", format!("{place}: timestamp {time} s does not follow {last} s"));
-        return;
-    }
-    if last.is_finite() && time - *last > DAY_SECS {
-        let fault = format!("timestamp {time} s is more than a day after {last} s; write seconds of one clock");
-        faults.add("time", format!("{place}: {fault}"));
-    }
-    *last = time;
 }
 
 /// What a frame has on disk.
@@ -226,77 +165,22 @@ fn files(folder: &Folder, entry: &FrameEntry, index: usize, place: &str, faults:
     FrameFiles { rgb, depth, normals, mask, segments }
 }
 
-/// Seconds and metres, as far as all frames together tell.
-fn check_scale(out: &[Frame], faults: &mut Faults) {
-    let steps: Vec<f64> = out.windows(2).map(|w| w[1].timestamp_secs - w[0].timestamp_secs).collect();
-    if let Some(step) = stats::median(&steps).filter(|s| s.is_finite() && !(1e-3..=10.0).contains(s)) {
-        faults.add(
-            "time unit",
-            format!("cameras.json: frames are {step:.3e} s apart (median), a video's are 0.005 to 1 s; write seconds"),
-        );
-    }
-    let near = |f: &&Frame| f.center().coords.iter().all(|c| c.abs() < MAX_COORDINATE);
-    let furthest = out.iter().filter(near).map(|f| f.center().coords.norm()).fold(0.0, f64::max);
-    // Head-worn recordings stay in a home; a home measured in millimetres is a city.
-    if furthest > 1000.0 {
-        faults.add(
-            "units",
-            format!("cameras.json: a camera is {furthest:.0} from the origin; positions must be metres (are these millimetres?)"),
-        );
-    }
-}
-
-fn check_clips(clips: &[Clip], frames: usize, faults: &mut Faults) {
-    let mut names = BTreeSet::new();
-    for clip in clips {
-        if !names.insert(&clip.clip) {
-            faults.add("name", format!("clips.json: clip {}: the name is used twice", clip.clip));
-        }
-        if clip.start_frame > clip.end_frame {
-            let (a, b) = (clip.start_frame, clip.end_frame);
-            faults.add("order", format!("clips.json: clip {}: start_frame {a} is after end_frame {b}", clip.clip));
-        } else if clip.end_frame >= frames {
-            faults.add(
-                "outside",
-                format!(
-                    "clips.json: clip {}: frames {}..={} lie outside the video of {frames} frames",
-                    clip.clip, clip.start_frame, clip.end_frame
-                ),
-            );
-        }
-    }
-}
-
-fn hands(dir: &Path, frames: usize, faults: &mut Faults) -> Result<Vec<HandSample>> {
+/// The hands as they stand in a file, and its name.
+fn hands(dir: &Path, faults: &mut Faults) -> Result<(&'static str, Vec<HandSample>)> {
     let full = dir.join("hands.json");
     let tips = dir.join("fingertips.csv");
-    let mut hands = if full.is_file() {
-        hands_json(&full, faults)?
+    if full.is_file() {
+        Ok(("hands.json", hands_json(&full, faults)?))
     } else if tips.is_file() {
-        fingertips_csv(&tips)?
+        Ok(("fingertips.csv", fingertips_csv(&tips)?))
     } else {
-        return Err(Error::Io {
+        Err(Error::Io {
             path: full,
             message: "no such file, and no fingertips.csv either; a recording needs one of them: run a hand tracker and import \
                       its output too (paws import SOURCE HANDS --out DIR)"
                 .to_owned(),
-        });
-    };
-    let name = if full.is_file() { "hands.json" } else { "fingertips.csv" };
-    hands.retain(|s| {
-        let inside = s.frame < frames;
-        if !inside {
-            faults.add("hand frame", format!("{name}: frame {}: the video has {frames} frames", s.frame));
-        }
-        let finite = s.tips.iter().all(|p| p.coords.iter().all(|x| x.abs() < MAX_COORDINATE));
-        if !finite {
-            let fault = "a fingertip is not finite or overflows; leave the hand out";
-            faults.add("hand", format!("{name}: frame {}: {fault}", s.frame));
-        }
-        inside && finite
-    });
-    hands.sort_by_key(|s| (s.frame, s.side));
-    Ok(hands)
+        })
+    }
 }
 
 fn hands_json(path: &Path, faults: &mut Faults) -> Result<Vec<HandSample>> {
@@ -408,37 +292,4 @@ fn fingertips_csv(path: &Path) -> Result<Vec<HandSample>> {
         samples.push(HandSample { frame: index, side, contact, tips, joints: None });
     }
     Ok(samples)
-}
-
-/// A hand's own size tells the unit of the file, whatever the scene is like.
-fn check_hands(hands: &[HandSample], frames: &[Frame], judge: bool, faults: &mut Faults) {
-    if hands.is_empty() {
-        faults.add("hands", "hands.json / fingertips.csv: no hand in any frame".to_owned());
-        return;
-    }
-    let spreads: Vec<f64> = hands.iter().map(|s| (s.tips[0] - s.tips[1]).norm()).collect();
-    let distances: Vec<f64> =
-        hands.iter().filter_map(|s| frames.get(s.frame).map(|f| (s.grasp() - f.center()).norm())).collect();
-    if let Some(spread) = stats::median(&spreads)
-        && !(0.002..0.3).contains(&spread)
-    {
-        faults.add(
-            "units",
-            format!(
-                "hands: thumb and index tips are {spread:.3} apart (median), a hand's are 0.01 to 0.2 m; \
-                 convert the hands to metres"
-            ),
-        );
-    } else if let Some(distance) = stats::median(&distances)
-        && judge
-        && !(0.05..3.0).contains(&distance)
-    {
-        faults.add(
-            "units",
-            format!(
-                "hands are {distance:.2} from the camera (median), an arm reaches 0.2 to 1.2 m; hands and camera poses \
-                 must share one world frame and one unit (metres); paws import --check looks for the cause"
-            ),
-        );
-    }
 }

@@ -27,6 +27,33 @@ pub(super) fn read(dir: &Path) -> Result<Vec<Point>> {
     Ok(finite)
 }
 
+/// Whether points show surfaces without holes, as depth does, so that what lies behind a surface does not show through it.
+///
+/// Of the 26 cells around one that a plane runs through the plane fills eight, an edge or a row of corners two; noise fills others,
+/// too, but each with a point or two. Cells are what a point covers when it is seen (`images::splat`); a scan or a mesh has a
+/// point every two to three centimetres.
+pub(crate) fn is_dense(points: &[Point]) -> bool {
+    const CELL_M: f64 = 0.05;
+    const NEIGHBOURS: usize = 6;
+    const POINTS: usize = 3;
+    /// Cells that are asked; a median of so many is known well.
+    const ASKED: usize = 4000;
+    let mut cells: Vec<[i64; 3]> =
+        points.iter().map(|p| [p.x, p.y, p.z].map(|c| (c / CELL_M).floor() as i64)).collect();
+    cells.sort_unstable();
+    cells.dedup();
+    if points.len() < POINTS * cells.len() {
+        return false;
+    }
+    let around = |[x, y, z]: &[i64; 3]| {
+        let beside = (0..27).filter(|i| *i != 13).map(|i: i64| [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1]);
+        beside.filter(|cell| cells.binary_search(cell).is_ok()).count()
+    };
+    let mut counts: Vec<usize> = cells.iter().step_by(cells.len().div_ceil(ASKED).max(1)).map(around).collect();
+    counts.sort_unstable();
+    counts.get(counts.len() / 2).is_some_and(|count| *count >= NEIGHBOURS)
+}
+
 #[derive(Default)]
 struct PlyVertex([f64; 3]);
 
@@ -107,6 +134,18 @@ fn obj_points(path: &Path) -> Result<Vec<Point>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_scanned_wall_is_dense_and_points_of_its_edges_are_not() {
+        let wall: Vec<Point> =
+            (0..10_000).map(|i| Point::new(0.02 * f64::from(i % 100), 0.0, 0.02 * f64::from(i / 100))).collect();
+        assert!(is_dense(&wall));
+        let edges: Vec<Point> = (0..400)
+            .map(|i| Point::new(0.5 * f64::from(i % 4), 0.0, 0.02 * f64::from(i / 4)))
+            .chain((0..200).map(|i| Point::new(0.31 * f64::from(i % 20), 0.4, 0.27 * f64::from(i / 20))))
+            .collect();
+        assert!(!is_dense(&edges) && !is_dense(&[Point::origin()]) && !is_dense(&[]));
+    }
 
     #[test]
     fn an_obj_is_its_vertices_whatever_its_faces_and_materials_say() {

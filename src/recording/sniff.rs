@@ -1,11 +1,17 @@
 //! What a file is that is no table of numbers: its first bytes tell, and a way out goes with the answer.
 
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use crate::json::POINTER;
+
 /// Bytes that are looked at.
 pub(super) const LOOKED_AT: usize = 4096;
 
 /// What a file that begins so is, and what to do, where it is surely no text table; `None` else.
 pub(super) fn no_table(start: &[u8]) -> Option<String> {
-    const SIGNS: [(&[u8], &str, &str); 9] = [
+    const SIGNS: [(&[u8], &str, &str); 13] = [
         (&[0x1f, 0x8b], "is compressed with gzip", "unpack it with gunzip"),
         (b"BZh", "is compressed with bzip2", "unpack it with bunzip2"),
         (&[0xfd, b'7', b'z', b'X', b'Z'], "is compressed with xz", "unpack it with unxz"),
@@ -15,7 +21,18 @@ pub(super) fn no_table(start: &[u8]) -> Option<String> {
         (&[0xfe, 0xff], "is UTF-16 text", "save it as UTF-8: iconv -f UTF-16 -t UTF-8"),
         (b"\x93NUMPY", "is a NumPy array", "write it with numpy.savetxt"),
         (b"\x89HDF", "is HDF5", "write the positions as text"),
+        (b"#ROSBAG V", "is a ROS 1 bag", "write the topic's positions as CSV (rostopic echo -p)"),
+        (
+            b"\x89MCAP",
+            "is an MCAP recording",
+            "write the topic's positions as CSV, or import the recording (paws import)",
+        ),
+        (b"SQLite format 3", "is an SQLite file, as rosbag2 writes", "write the topic's positions as CSV"),
+        (b"MATLAB 5.0", "is a MATLAB file", "write the positions with writematrix"),
     ];
+    if start.starts_with(POINTER.0) {
+        return Some(POINTER.1.to_owned());
+    }
     if let Some((_, what, way)) = SIGNS.iter().find(|(sign, ..)| start.starts_with(sign)) {
         return Some(format!("{what}; {way}"));
     }
@@ -30,8 +47,39 @@ pub(super) fn no_table(start: &[u8]) -> Option<String> {
     if next(b'<').is_some() {
         return Some("is HTML or XML; write the positions as lines of x y z".to_owned());
     }
+    if is_yaml(text) {
+        return Some("is YAML; write the positions as lines of x y z, with a header for other columns".to_owned());
+    }
     (!text.contains(&b'\n') && text.contains(&b'\r'))
         .then(|| "has carriage returns and no line ends; save it with the line ends of Unix or Windows".to_owned())
+}
+
+/// Whether a file is a Git LFS pointer, which stands for a file that was not fetched.
+pub(super) fn is_pointer(path: &Path) -> bool {
+    let mut start = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(POINTER.0.len() as u64).read_to_end(&mut start));
+    read.is_ok() && start == POINTER.0
+}
+
+/// Whether text begins as YAML does: with its mark, a list of lists or objects, or a key and what is indented below it.
+fn is_yaml(text: &[u8]) -> bool {
+    let text = String::from_utf8_lossy(text);
+    let mut lines = text.lines().filter(|l| !l.trim().is_empty() && !l.starts_with('#'));
+    let (Some(first), second) = (lines.next(), lines.next().unwrap_or_default()) else { return false };
+    let is_key = |text: &str| {
+        text.split_once(':').is_some_and(|(key, rest)| {
+            let is_word = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
+            !key.is_empty() && key.chars().all(is_word) && (rest.is_empty() || rest.starts_with(' '))
+        })
+    };
+    let is_item = |text: &str| {
+        text.trim_start()
+            .strip_prefix("- ")
+            .map(str::trim_start)
+            .is_some_and(|t| t.starts_with(['[', '{']) || is_key(t))
+    };
+    let is_below = second.starts_with([' ', '-']) && (is_item(second) || is_key(second.trim_start()));
+    first.trim_end() == "---" || first.starts_with("%YAML") || is_item(first) || (is_key(first.trim_end()) && is_below)
 }
 
 /// Whether a line that is not all numbers stands above them as a title or a header: it is words, with few numbers among them.
@@ -130,11 +178,23 @@ mod tests {
             (&b"<!doctype html>"[..], "HTML"),
             (&b"1 2 3\r4 5 6\r"[..], "carriage returns"),
             (&b"1 2\0 3"[..], "zero bytes"),
+            (&b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n"[..], "git lfs pull"),
+            (&b"#ROSBAG V2.0\n\x01"[..], "ROS 1 bag"),
+            (&b"\x89MCAP0\r\n\0"[..], "MCAP"),
+            (&b"SQLite format 3\0"[..], "SQLite"),
+            (&b"MATLAB 5.0 MAT-file\0"[..], "MATLAB"),
+            (&b"- [0.1, 0.2, 0.3]\n- [0.1, 0.2, 0.4]\n"[..], "YAML"),
+            (&b"# made by hand\nposes:\n  - {x: 1, y: 2, z: 3}\n"[..], "YAML"),
+            (&b"header:\n  seq: 1\n"[..], "YAML"),
+            (&b"---\nx: 1\n"[..], "YAML"),
         ] {
             let said = no_table(bytes).unwrap_or_default();
             assert!(said.contains(word), "{word}: {said}");
         }
-        for bytes in [&b"1 2 3\r\n4 5 6\r\n"[..], b"\xef\xbb\xbft,x,y,z\n", b"", b"# {a}\n1 2 3", b"[1, 2, 3]\n"] {
+        for bytes in [&b"1 2 3\r\n4 5 6\r\n"[..], b"\xef\xbb\xbft,x,y,z\n", b"", b"# {a}\n1 2 3", b"[1, 2, 3]\n"]
+            .into_iter()
+            .chain([&b"Positions:\n-0.1 0.2 0.3\n"[..], b"Rate: 120\nt,x,y,z\n", b"- 0.1 0.2\n", b"- - -\n1 2 3\n"])
+        {
             assert_eq!(no_table(bytes), None);
         }
     }

@@ -27,6 +27,11 @@ pub struct BareTrajectory {
     pub notes: Vec<String>,
 }
 
+/// What is wrong where times go back, and where the last column of a table without names rises meanwhile.
+const TIME_BACK: &str = "the time stamp goes back; sort the lines";
+const TIME_LAST: &str = "the time stamp goes back, and the last column rises: is the time last? Name the columns in a header \
+                         (x y z t); else sort the lines";
+
 /// Text lines that may stand above the numbers.
 const MAX_TITLES: usize = 20;
 
@@ -102,12 +107,15 @@ struct Table<'a> {
     /// Text lines above the numbers: number of the line, text, whether it is a comment.
     titles: Vec<(usize, String, bool)>,
     layout: Option<Layout>,
+    /// The last column of the row before, while it rises from row to row.
+    rising: Option<f64>,
     out: BareTrajectory,
 }
 
 impl<'a> Table<'a> {
     fn new(path: &'a Path) -> Self {
-        Self { path, titles: Vec::new(), layout: None, out: BareTrajectory::default() }
+        let rising = Some(f64::NEG_INFINITY);
+        Self { path, titles: Vec::new(), layout: None, rising, out: BareTrajectory::default() }
     }
 
     fn fault(&self, number: usize, message: impl Into<String>) -> Error {
@@ -166,7 +174,13 @@ impl<'a> Table<'a> {
     /// The fault of a file in which no line has numbers: its first line shows what it is.
     fn no_numbers(&self) -> Error {
         match self.titles.iter().find(|(.., is_comment)| !is_comment) {
-            Some((number, text, _)) => self.not_all_numbers(*number, text, &sniff::hint(text, &cells(text))),
+            Some((number, text, _)) => {
+                let names = cells(text);
+                let is_header = columns::understood(&names) >= 3;
+                let hint =
+                    if is_header { "; it is a header, and no row follows".into() } else { sniff::hint(text, &names) };
+                self.not_all_numbers(*number, text, &hint)
+            }
             None => Error::format(self.path, "end of file", "no positions; expected lines of x y z"),
         }
     }
@@ -242,10 +256,12 @@ impl<'a> Table<'a> {
             return Err(self.fault(number, "a value is not finite; leave the line out"));
         }
         let value = |column: usize| values.get(column).copied().unwrap_or(0.0);
+        self.rising = self.rising.and_then(|before| values.last().copied().filter(|last| *last > before));
         if let Some((column, seconds)) = layout.time {
             let time = value(column) * seconds;
             if self.out.times_secs.last().is_some_and(|&last| time < last) {
-                return Err(self.fault(number, "the time stamp goes back; sort the lines"));
+                let is_last = self.rising.is_some() && self.titles.is_empty();
+                return Err(self.fault(number, if is_last { TIME_LAST } else { TIME_BACK }));
             }
             self.out.times_secs.push(time);
         }
@@ -435,7 +451,9 @@ mod tests {
             ("1 2 3\nnan 2 3\n", "line 2: a value is not finite"),
             ("1 2 3\nx y z\n", "line 2"),
             ("1 2 3 9 0 0 1\n", "norm"),
-            ("1 1 2 3\n0 1 2 3\n", "goes back"),
+            ("1 1 2 3\n0 1 2 3\n", "goes back; sort the lines"),
+            ("0.5 1 2 0.0\n0.4 1 2 0.1\n", "is the time last?"),
+            ("t x y z\n0.5 1 2 0.0\n0.4 1 2 0.1\n", "goes back; sort the lines"),
             ("", "no positions"),
             (&"1 ".repeat(100_000), "longer than 64 KiB"),
         ] {
@@ -482,6 +500,7 @@ mod tests {
             ("x y z\n1 2 3\nx y z\n4 5 6\n", "a second header"),
             ("1 0 0 0 0 1 0 0 0 0 1 0\n", "4th, 8th and 12th"),
             ("x y z\n", "is not all numbers"),
+            ("t,x,y,z\n", "it is a header, and no row follows"),
         ] {
             let error = check(text).unwrap_err();
             assert!(error.contains(word), "{text}: {error}");

@@ -1,18 +1,19 @@
 //! Accuracy for people (tables) and for spreadsheets (CSV).
 
+use super::phrases;
 use super::table::aligned;
-use super::words;
 use crate::articulation::{Action, JointKind};
 use crate::evaluation::bootstrap::Interval;
-use crate::evaluation::calibration::Calibration;
+use crate::evaluation::calibration::CalibrationReport;
+use crate::evaluation::clip_report::ClipReport;
 use crate::evaluation::deviations::{Deviations, Spread};
 use crate::evaluation::rules::usdnet_mo;
-use crate::evaluation::summary::{ClipReport, RuleShares, Shares, SharesInterval};
-use crate::evaluation::{Measured, Paired, Report, Rule};
+use crate::evaluation::summary::{RuleShares, Shares, SharesInterval};
+use crate::evaluation::{AnswerErrors, EvaluationReport, Paired, Rule};
 
-type Rows = Vec<Vec<String>>;
+type TextRows = Vec<Vec<String>>;
 
-fn header<const N: usize>(names: [&str; N]) -> Rows {
+fn header<const N: usize>(names: [&str; N]) -> TextRows {
     vec![names.map(str::to_owned).to_vec()]
 }
 
@@ -40,7 +41,7 @@ fn cells(shares: Shares, interval: Option<SharesInterval>) -> [String; 3] {
 
 /// Counts, and every rule's shares of all clips.
 #[must_use]
-pub fn headline(report: &Report) -> String {
+pub fn headline(report: &EvaluationReport) -> String {
     let mut text = format!(
         "clips that move a joint: {}   answered (Match): {} = {:.3} micro, {:.3} macro\n\
          clips that move none: {}   answered all the same (false positives): {}\n\n",
@@ -70,7 +71,7 @@ pub fn headline(report: &Report) -> String {
 
 /// Denominators, groups, errors, calibration, grouping and failures.
 #[must_use]
-pub fn details(report: &Report) -> String {
+pub fn details(report: &EvaluationReport) -> String {
     let mut text = format!("\nwhat became of the clips (axis 15°, hinge 25 cm at the part)\n{}", failures(report));
     text += &format!("\nby denominator\n{}", denominators(report));
     text += &format!("\nby group, all clips\n{}", groups(report));
@@ -89,16 +90,16 @@ pub fn details(report: &Report) -> String {
     text + &confidences(report) + &coverage(report)
 }
 
-fn failures(report: &Report) -> String {
+fn failures(report: &EvaluationReport) -> String {
     let mut rows = header(["end", "clips", "share", "median"]);
     for f in &report.failures {
-        let beside = or_dash(f.beside_m, words::centimetres);
+        let beside = or_dash(f.beside_m, phrases::centimetres);
         rows.push(vec![f.failure.words().to_owned(), f.clips.to_string(), share(f.share), beside]);
     }
     aligned(&rows)
 }
 
-fn denominators(report: &Report) -> String {
+fn denominators(report: &EvaluationReport) -> String {
     let mut rows = header(["rule", "of", "average", "M", "MA", "MAO"]);
     for r in &report.rules {
         let of = [
@@ -114,7 +115,7 @@ fn denominators(report: &Report) -> String {
     aligned(&rows)
 }
 
-fn groups(report: &Report) -> String {
+fn groups(report: &EvaluationReport) -> String {
     let mut rows = header(["by", "group", "clips", "answered", "M", "MA", "MAO point", "MAO line", "STRICT", "SIM"]);
     for g in &report.groups {
         let of = |rule: Rule| g.rules.iter().find(|r: &&RuleShares| r.rule == rule).map(|r| r.shares);
@@ -135,7 +136,7 @@ fn groups(report: &Report) -> String {
     aligned(&rows)
 }
 
-fn deviations(report: &Report) -> String {
+fn deviations(report: &EvaluationReport) -> String {
     let mut rows = header([
         "type",
         "answers",
@@ -158,17 +159,17 @@ fn deviations(report: &Report) -> String {
             answers.to_string(),
             both(d.axis_rad, &degrees),
             or_dash(d.sense_right, share),
-            both(d.line_m, &words::centimetres),
-            both(d.range, &|v| if kind == JointKind::Revolute { degrees(v) } else { words::centimetres(v) }),
-            both(d.radius_m, &words::centimetres),
+            both(d.line_m, &phrases::centimetres),
+            both(d.range, &|v| if kind == JointKind::Revolute { degrees(v) } else { phrases::centimetres(v) }),
+            both(d.radius_m, &phrases::centimetres),
             or_dash(d.box_iou, |s| format!("{:.2}", s.median)),
-            both(d.box_edge_m, &words::centimetres),
+            both(d.box_edge_m, &phrases::centimetres),
         ]);
     }
     aligned(&rows)
 }
 
-fn mean_errors(report: &Report) -> String {
+fn mean_errors(report: &EvaluationReport) -> String {
     let mut rows = header(["measure", "clips", "axis mean", "axis median", "line mean", "line median"]);
     let degrees = |v: f64| format!("{:.2}°", v.to_degrees());
     let metres = |v: f64| format!("{v:.3} m");
@@ -185,8 +186,8 @@ fn mean_errors(report: &Report) -> String {
     aligned(&rows)
 }
 
-fn confidences(report: &Report) -> String {
-    let table = |what: &str, c: &Calibration| {
+fn confidences(report: &EvaluationReport) -> String {
+    let table = |what: &str, c: &CalibrationReport| {
         let mut rows = header(["confidence", "answers", "mean", "right"]);
         for b in &c.bins {
             rows.push(vec![
@@ -217,7 +218,7 @@ fn confidences(report: &Report) -> String {
 }
 
 /// Empty where no prediction speaks of its errors.
-fn coverage(report: &Report) -> String {
+fn coverage(report: &EvaluationReport) -> String {
     if report.coverage.is_empty() {
         return String::new();
     }
@@ -258,7 +259,7 @@ pub fn signed_interval(i: Interval) -> String {
 
 /// One line a clip.
 #[must_use]
-pub fn per_clip(report: &Report) -> String {
+pub fn per_clip(report: &EvaluationReport) -> String {
     let mut rows = header([
         "recording",
         "clip",
@@ -280,9 +281,9 @@ pub fn per_clip(report: &Report) -> String {
                 row.extend([
                     if m.type_right { "right" } else { "wrong" }.to_owned(),
                     format!("{:.1}°{inward}", m.axis_rad.to_degrees()),
-                    or_dash(m.point_to_point_m, words::centimetres),
-                    or_dash(m.truth_to_line_m, words::centimetres),
-                    or_dash(m.range_error, |r| words::amount(m.kind, r)),
+                    or_dash(m.point_to_point_m, phrases::centimetres),
+                    or_dash(m.truth_to_line_m, phrases::centimetres),
+                    or_dash(m.range_error, |r| phrases::amount(m.kind, r)),
                     or_dash(m.box_iou, |v| format!("{v:.2}")),
                     c.failure.words().to_owned(),
                 ]);
@@ -294,10 +295,10 @@ pub fn per_clip(report: &Report) -> String {
 }
 
 /// A name of a column and what stands in it.
-type Column = (&'static str, fn(&Measured) -> Option<f64>);
+type CsvColumn = (&'static str, fn(&AnswerErrors) -> Option<f64>);
 
 /// Every measure, in units that spreadsheets take: radians and metres.
-const MEASURES: [Column; 19] = [
+const MEASURES: [CsvColumn; 19] = [
     ("axis_rad", |m| Some(m.axis_rad)),
     ("signed_axis_rad", |m| Some(m.signed_axis_rad)),
     ("point_to_point_m", |m| m.point_to_point_m),
@@ -337,7 +338,7 @@ const ABOUT: [&str; 12] = [
 
 /// One row a clip: what it is, every measure, the highest of M, MA and MAO that it reaches under every rule, and its end.
 #[must_use]
-pub fn csv(report: &Report) -> String {
+pub fn csv(report: &EvaluationReport) -> String {
     let mut names: Vec<&str> = ABOUT.to_vec();
     names.extend(MEASURES.iter().map(|(name, _)| *name));
     names.extend(Rule::ALL.iter().map(|r| r.key()));
@@ -421,7 +422,9 @@ mod tests {
             action: None,
             tier: None,
             noun: None,
+            place: None,
             predicted_joint: None,
+            predicted_scene: None,
             confidence: None,
             joint_confidence: None,
             measured: None,

@@ -2,14 +2,15 @@
 
 use serde::Serialize;
 
-use super::words;
+use super::phrases;
 use crate::articulation::{Articulation, Outcome};
-use crate::evaluation::truth::Stage;
+use crate::evaluation::truth::{InScene, Stage};
 use crate::evaluation::{Prediction, Predictions};
 use crate::inference::{ClipJoint, Uncertainty};
 use crate::math::Point;
 use crate::pipeline::{ClipResult, Scene, Told};
 use crate::reasoning::words::Words;
+use crate::recording::Videos;
 use crate::twin::Twin;
 
 /// One joint of `articulations.json`.
@@ -44,12 +45,12 @@ struct ClipEntry<'a> {
     outcome: &'a Outcome<ClipJoint>,
     #[serde(skip_serializing_if = "Option::is_none")]
     words: Option<&'a Words>,
-    evidence: Evidence,
+    evidence: EvidenceCounts,
 }
 
 /// How much of everything there was.
 #[derive(Debug, Serialize)]
-struct Evidence {
+struct EvidenceCounts {
     hand_samples: usize,
     rejected_hand_samples: usize,
     confident_voxels: usize,
@@ -64,6 +65,8 @@ struct Evidence {
 #[derive(Debug, Serialize)]
 struct ArticulationsFile<'a> {
     recording: &'a str,
+    #[serde(skip_serializing_if = "Videos::is_empty")]
+    videos: &'a Videos,
     frame: &'static str,
     reasoner: &'a str,
     manhattan: Option<[crate::math::Vector; 3]>,
@@ -78,6 +81,7 @@ struct ArticulationsFile<'a> {
 pub fn articulations(scene: &Scene, reasoner: &str) -> crate::error::Result<String> {
     let file = ArticulationsFile {
         recording: &scene.recording,
+        videos: &scene.videos,
         frame: "world of the recording; metres, radians; positive motion opens",
         reasoner,
         manhattan: scene.manhattan.map(|m| m.axes),
@@ -93,7 +97,7 @@ pub fn articulations(scene: &Scene, reasoner: &str) -> crate::error::Result<Stri
                 grip: j.grip,
                 clips: &j.clips,
                 told: &j.told,
-                refuted: words::refuted(j),
+                refuted: phrases::refuted(j),
             })
             .collect(),
         clips: scene
@@ -107,7 +111,7 @@ pub fn articulations(scene: &Scene, reasoner: &str) -> crate::error::Result<Stri
                 joint_of_scene: scene.joint_of(&c.clip.clip).map(|j| j.id.as_str()),
                 outcome: &c.joint,
                 words: c.words.as_ref(),
-                evidence: Evidence {
+                evidence: EvidenceCounts {
                     hand_samples: c.trajectory.as_ref().map_or(0, |t| t.samples.len()),
                     rejected_hand_samples: c
                         .trajectory
@@ -131,22 +135,24 @@ pub fn articulations(scene: &Scene, reasoner: &str) -> crate::error::Result<Stri
 fn stage(clip: &ClipResult) -> Stage {
     match (&clip.trajectory, &clip.region) {
         (None, _) => Stage::Hands,
-        (_, None) => Stage::Localization,
+        // Without depth nothing is localised and all of it inferred.
+        (_, None) if clip.candidates.is_empty() => Stage::Localization,
         _ => Stage::Inference,
     }
 }
 
 /// One row a clip: the scene's joint where the clip shows one or is told to move it, the range of the clip that shows it, the
-/// twin's box.
+/// twin's box. Clips of a joined recording have the names of their own recording and of their clip there.
 #[must_use]
 pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
     let rows = scene
         .clips
         .iter()
         .map(|c| {
+            let of_video = scene.videos.of_clip(&c.clip.clip);
             let mut row = Prediction {
-                recording: scene.recording.clone(),
-                clip: c.clip.clip.clone(),
+                recording: of_video.map_or(&scene.recording, |(video, _)| &video.name).clone(),
+                clip: of_video.map_or(c.clip.clip.as_str(), |(_, own)| own).to_owned(),
                 kind: None,
                 axis: None,
                 origin: None,
@@ -161,6 +167,10 @@ pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
                 reason: c.joint.reason().map(str::to_owned),
                 stage: c.joint.reason().map(|_| stage(c)),
                 refuted: Vec::new(),
+                in_scene: of_video.map(|(video, _)| InScene {
+                    scene: scene.recording.clone(),
+                    own_from_scene: video.scene_from_own.inverse(),
+                }),
             };
             let Some((joint, at)) = scene.joint_of(&c.clip.clip).and_then(|j| Some((j, j.shown_by(&c.clip.clip)?)))
             else {
@@ -187,7 +197,7 @@ pub fn predictions(scene: &Scene, twin: &Twin) -> Predictions {
             row.confidence = joint.type_probability;
             row.joint_confidence = joint.joint_probability;
             row.joint = Some(joint.id.clone());
-            row.refuted = words::refuted(joint);
+            row.refuted = phrases::refuted(joint);
             row
         })
         .collect();
@@ -215,7 +225,11 @@ mod tests {
             id: "joint_0".to_owned(),
             joint,
             clips: vec!["other".to_owned(), "seen".to_owned()],
-            told: vec![Told { clip: "told".to_owned(), with: "seen".to_owned() }],
+            told: vec![Told {
+                clip: "told".to_owned(),
+                with: "seen".to_owned(),
+                action: crate::articulation::Action::Close,
+            }],
             furniture: None,
             type_probability: Some(0.9),
             joint_probability: Some(0.8),
@@ -231,6 +245,7 @@ mod tests {
             recording: "kitchen".to_owned(),
             manhattan: None,
             depth_factors: crate::recording::DepthFactors::default(),
+            videos: Default::default(),
             clips: ["other", "seen", "told", "lost"].map(clip).to_vec(),
             joints: vec![drawer],
             surroundings: None,

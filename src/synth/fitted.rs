@@ -4,7 +4,8 @@ use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 
 use super::kitchen::{
-    BOARD, Bounds, Builder, DEPTH, GAP, HANDLE, Kitchen, Moving, Side, TRAY, bar, grip, hinge_line, tray,
+    BOARD, BoxBounds, DEPTH, FLOOR, FRONTS, GAP, HANDLE, HingeEdge, Kitchen, KitchenBuilder, Moving, PLINTH, STEEL,
+    STONE, TRAY, WALL, bar, grip, hinge_line, rail, tray,
 };
 use crate::articulation::JointKind;
 use crate::math::{Point, Pose, Vector, rotation};
@@ -35,18 +36,13 @@ const DRAWER_M: f64 = 0.46;
 const SHAKER: f64 = 0.45;
 const STRIPED: f64 = 0.3;
 /// Colours.
-const STEEL: [u8; 3] = [176, 178, 182];
-const GLASS: [u8; 3] = [26, 28, 32];
-const STRIPE: [u8; 3] = [66, 58, 50];
+pub(super) const GLASS: [u8; 3] = [26, 28, 32];
+pub(super) const STRIPE: [u8; 3] = [66, 58, 50];
+pub(super) const TILE: [u8; 3] = [216, 214, 206];
 const WHITE: [u8; 3] = [228, 228, 226];
-const STONE: [u8; 3] = [70, 66, 64];
-const PLINTH: [u8; 3] = [60, 60, 62];
-const TILE: [u8; 3] = [216, 214, 206];
-const WALL: [u8; 3] = [206, 204, 196];
-const FLOOR: [u8; 3] = [150, 146, 140];
 
 /// A hinged front and where it sits.
-struct Front {
+struct HingedFront {
     kind: &'static str,
     noun: &'static str,
     class: &'static str,
@@ -55,17 +51,17 @@ struct Front {
     z: [f64; 2],
     /// Its surface.
     face: f64,
-    side: Side,
+    side: HingeEdge,
     color: [u8; 3],
     /// It may carry a raised frame and a stripe.
     wooden: bool,
     /// It has a window.
     window: bool,
-    base: Bounds,
+    base: BoxBounds,
 }
 
 struct Fitter<'a> {
-    b: Builder,
+    b: KitchenBuilder,
     rng: &'a mut Pcg64Mcg,
     shaker: bool,
 }
@@ -94,10 +90,9 @@ pub fn build(rng: &mut Pcg64Mcg, turned_rad: Option<[f64; 2]>) -> Kitchen {
     let turn = turned_rad.map_or(0.0, |[low, high]| sign * (low + (high - low) * share));
     let world_from_room = Pose::from_parts(place.into(), rotation(&Vector::z(), yaw));
     let world_from_kitchen = world_from_room * turned(turn);
-    let palettes = [[196, 164, 122], [226, 226, 222], [104, 128, 118], [168, 176, 186], [150, 108, 78]];
-    let front = palettes[rng.random_range(0..palettes.len())];
+    let front = FRONTS[rng.random_range(0..FRONTS.len())];
     let shaker = rng.random_bool(SHAKER);
-    let b = Builder { world_from_kitchen, fixed: Vec::new(), parts: Vec::new(), front };
+    let b = KitchenBuilder { world_from_kitchen, fixed: Vec::new(), parts: Vec::new(), front };
     let mut fitter = Fitter { b, rng, shaker };
     let end = fitter.long_row();
     fitter.bin(end + 0.35);
@@ -113,7 +108,7 @@ fn turned(angle: f64) -> Pose {
 }
 
 /// Walls just behind the furniture, and the floor with its boards.
-fn room(b: &mut Builder) {
+fn room(b: &mut KitchenBuilder) {
     const FAR: f64 = 8.0;
     let room_from_world = b.world_from_kitchen.inverse();
     let shapes = b.fixed.iter().map(|block| block.shape).chain(b.parts.iter().map(|p| p.bounds));
@@ -218,8 +213,8 @@ impl Fitter<'_> {
         [0.4, 0.5, 0.6][self.rng.random_range(0..3)]
     }
 
-    fn side(&mut self) -> Side {
-        if self.rng.random_bool(0.5) { Side::Left } else { Side::Right }
+    fn side(&mut self) -> HingeEdge {
+        if self.rng.random_bool(0.5) { HingeEdge::Left } else { HingeEdge::Right }
     }
 
     /// Three or four drawers, one over the other.
@@ -266,15 +261,15 @@ impl Fitter<'_> {
     fn double_door(&mut self, x: [f64; 2]) {
         let base = [x, [0.0, DEPTH], BASE_Z];
         self.b.carcass(x, [0.0, DEPTH], BASE_Z, class("cupboard"));
-        self.cupboard_door([x[0], middle(x)], BASE_Z, FACE, Side::Right, base);
-        self.cupboard_door([middle(x), x[1]], BASE_Z, FACE, Side::Left, base);
+        self.cupboard_door([x[0], middle(x)], BASE_Z, FACE, HingeEdge::Right, base);
+        self.cupboard_door([middle(x), x[1]], BASE_Z, FACE, HingeEdge::Left, base);
     }
 
-    fn cupboard_door(&mut self, x: [f64; 2], z: [f64; 2], face: f64, side: Side, base: Bounds) {
-        let kind = if side == Side::Top { "flap" } else { "door" };
+    fn cupboard_door(&mut self, x: [f64; 2], z: [f64; 2], face: f64, side: HingeEdge, base: BoxBounds) {
+        let kind = if side == HingeEdge::Top { "flap" } else { "door" };
         let color = self.b.front;
         let (noun, class) = ("cupboard", "cupboard");
-        self.front(&Front { kind, noun, class, x, z, face, side, color, wooden: true, window: false, base });
+        self.front(&HingedFront { kind, noun, class, x, z, face, side, color, wooden: true, window: false, base });
     }
 
     fn pantry(&mut self, x: [f64; 2]) {
@@ -282,7 +277,19 @@ impl Fitter<'_> {
         let base = [x, [0.0, DEPTH], z];
         self.b.carcass(x, [0.0, DEPTH], z, class("cupboard"));
         let (kind, noun, class) = ("pantry", "pantry", "cupboard");
-        self.front(&Front { kind, noun, class, x, z, face: FACE, side, color, wooden: true, window: false, base });
+        self.front(&HingedFront {
+            kind,
+            noun,
+            class,
+            x,
+            z,
+            face: FACE,
+            side,
+            color,
+            wooden: true,
+            window: false,
+            base,
+        });
     }
 
     /// A freezer's door below, the fridge's above, hinged on one side.
@@ -293,7 +300,7 @@ impl Fitter<'_> {
             let base = [x, [0.0, DEPTH], z];
             self.b.carcass(x, [0.0, DEPTH], z, class(class_name));
             let (class, face) = (class_name, FACE);
-            self.front(&Front { kind, noun, class, x, z, face, side, color, wooden: false, window: false, base });
+            self.front(&HingedFront { kind, noun, class, x, z, face, side, color, wooden: false, window: false, base });
         }
     }
 
@@ -306,17 +313,29 @@ impl Fitter<'_> {
         let z = [split, BASE_Z[1]];
         let base = [x, [0.0, DEPTH], z];
         self.b.carcass(x, [0.0, DEPTH], z, class("oven"));
-        let (kind, noun, class, side) = ("oven", "oven", "oven", Side::Bottom);
+        let (kind, noun, class, side) = ("oven", "oven", "oven", HingeEdge::Bottom);
         let (face, color) = (FACE, STEEL);
-        self.front(&Front { kind, noun, class, x, z, face, side, color, wooden: false, window: true, base });
+        self.front(&HingedFront { kind, noun, class, x, z, face, side, color, wooden: false, window: true, base });
     }
 
     fn dishwasher(&mut self, x: [f64; 2]) {
         let (z, base) = (BASE_Z, [x, [0.0, DEPTH], BASE_Z]);
         self.b.carcass(x, [0.0, DEPTH], z, class("dishwasher"));
         let color = if self.rng.random_bool(0.5) { STEEL } else { self.b.front };
-        let (kind, noun, class, side) = ("dishwasher", "dishwasher", "dishwasher", Side::Bottom);
-        self.front(&Front { kind, noun, class, x, z, face: FACE, side, color, wooden: false, window: false, base });
+        let (kind, noun, class, side) = ("dishwasher", "dishwasher", "dishwasher", HingeEdge::Bottom);
+        self.front(&HingedFront {
+            kind,
+            noun,
+            class,
+            x,
+            z,
+            face: FACE,
+            side,
+            color,
+            wooden: false,
+            window: false,
+            base,
+        });
     }
 
     /// A row of cupboards on the wall. `flap`: the first one opens upwards; of the others every fifth does.
@@ -335,12 +354,12 @@ impl Fitter<'_> {
             match (first || draw == 4, split) {
                 (true, true) => {
                     for z in [[WALL_Z[0], middle(WALL_Z)], [middle(WALL_Z), WALL_Z[1]]] {
-                        self.cupboard_door(span, z, face, Side::Top, base(z));
+                        self.cupboard_door(span, z, face, HingeEdge::Top, base(z));
                     }
                 }
-                (true, false) => self.cupboard_door(span, WALL_Z, face, Side::Top, base(WALL_Z)),
+                (true, false) => self.cupboard_door(span, WALL_Z, face, HingeEdge::Top, base(WALL_Z)),
                 (false, _) => {
-                    let side = if draw < 2 { Side::Left } else { Side::Right };
+                    let side = if draw < 2 { HingeEdge::Left } else { HingeEdge::Right };
                     self.cupboard_door(span, WALL_Z, face, side, base(WALL_Z));
                 }
             }
@@ -356,9 +375,9 @@ impl Fitter<'_> {
         let class_number = class("microwave");
         self.b.carcass([x, x + 0.46], y, z, class_number);
         self.b.fix([inset(panel), [y[1], face], inset(z)], GLASS, class_number);
-        let (kind, noun, class, side) = ("microwave", "microwave", "microwave", Side::Left);
+        let (kind, noun, class, side) = ("microwave", "microwave", "microwave", HingeEdge::Left);
         let base = [[x, x + 0.46], y, z];
-        self.front(&Front {
+        self.front(&HingedFront {
             kind,
             noun,
             class,
@@ -374,7 +393,7 @@ impl Fitter<'_> {
     }
 
     /// A front that turns, with its handle.
-    fn front(&mut self, f: &Front) {
+    fn front(&mut self, f: &HingedFront) {
         let (fx, fz) = (inset(f.x), inset(f.z));
         let mut boxes = vec![([fx, [f.face - BOARD, f.face], fz], f.color)];
         if f.wooden {
@@ -389,9 +408,9 @@ impl Fitter<'_> {
         boxes.push((bar(hx, hz, f.face, upright), HANDLE));
         let (axis, origin) = hinge_line(f.side, fx, fz, f.face);
         let upper = match f.side {
-            Side::Left | Side::Right => DOOR_RAD,
-            Side::Bottom => DROP_RAD,
-            Side::Top => FLAP_RAD,
+            HingeEdge::Left | HingeEdge::Right => DOOR_RAD,
+            HingeEdge::Bottom => DROP_RAD,
+            HingeEdge::Top => FLAP_RAD,
         };
         self.b.add(Moving {
             kind: f.kind,
@@ -489,10 +508,10 @@ impl Fitter<'_> {
     }
 
     /// The raised frame and the stripe of a wooden front.
-    fn ornaments(&mut self, fx: [f64; 2], fz: [f64; 2], face: f64) -> Vec<(Bounds, [u8; 3])> {
+    fn ornaments(&mut self, fx: [f64; 2], fz: [f64; 2], face: f64) -> Vec<(BoxBounds, [u8; 3])> {
         // The frame keeps off the edge, so that it turns past its neighbour's.
         const EDGE: f64 = 0.008;
-        let color = self.b.front.map(|c| c - c / 12);
+        let color = rail(self.b.front);
         let (x, z) = ([fx[0] + EDGE, fx[1] - EDGE], [fz[0] + EDGE, fz[1] - EDGE]);
         let rail = (0.2 * (z[1] - z[0])).min(0.06);
         let raised = [face, face + 0.006];

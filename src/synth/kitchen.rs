@@ -15,7 +15,7 @@ pub const CLASSES: [&str; 4] = ["drawer", "cupboard", "fridge", "dishwasher"];
 
 /// A coloured box.
 #[derive(Debug, Clone, Copy)]
-pub struct Block {
+pub struct ColoredBox {
     /// Where, closed.
     pub shape: OrientedBox,
     /// RGB.
@@ -48,14 +48,14 @@ pub struct OpenPart {
     /// The furniture behind it.
     pub base: OrientedBox,
     /// Its boxes.
-    pub blocks: Vec<Block>,
+    pub blocks: Vec<ColoredBox>,
 }
 
 /// The whole kitchen.
 #[derive(Debug, Clone)]
 pub struct Kitchen {
     /// What does not move.
-    pub fixed: Vec<Block>,
+    pub fixed: Vec<ColoredBox>,
     /// What does.
     pub parts: Vec<OpenPart>,
     /// Names of the mask classes, from class 1.
@@ -75,13 +75,31 @@ pub(super) const TRAY: [u8; 3] = [226, 222, 214];
 /// Bars of handles.
 pub(super) const HANDLE: [u8; 3] = [58, 60, 64];
 
+/// Appliances of metal.
+pub(super) const STEEL: [u8; 3] = [176, 178, 182];
+/// Worktops.
+pub(super) const STONE: [u8; 3] = [70, 66, 64];
+/// Below the furniture.
+pub(super) const PLINTH: [u8; 3] = [60, 60, 62];
+/// The room.
+pub(super) const WALL: [u8; 3] = [206, 204, 196];
+pub(super) const FLOOR: [u8; 3] = [150, 146, 140];
+/// What fronts may be: oak, white, green, grey-blue, walnut.
+pub(super) const FRONTS: [[u8; 3]; 5] =
+    [[196, 164, 122], [226, 226, 222], [104, 128, 118], [168, 176, 186], [150, 108, 78]];
+
+/// The colour of the raised frame of a front of a colour.
+pub(super) fn rail(front: [u8; 3]) -> [u8; 3] {
+    front.map(|c| c - c / 12)
+}
+
 /// Bounds of an upright box in kitchen coordinates: low and high in x, y and z.
-pub(super) type Bounds = [[f64; 2]; 3];
+pub(super) type BoxBounds = [[f64; 2]; 3];
 
 /// Builds in kitchen coordinates (x along the row, y out of the wall, z up) and places the result in the world.
-pub(super) struct Builder {
+pub(super) struct KitchenBuilder {
     pub(super) world_from_kitchen: Pose,
-    pub(super) fixed: Vec<Block>,
+    pub(super) fixed: Vec<ColoredBox>,
     pub(super) parts: Vec<OpenPart>,
     pub(super) front: [u8; 3],
 }
@@ -92,19 +110,19 @@ pub(super) struct Moving {
     pub(super) noun: &'static str,
     pub(super) class: u8,
     /// Its boxes with their colours.
-    pub(super) boxes: Vec<(Bounds, [u8; 3])>,
+    pub(super) boxes: Vec<(BoxBounds, [u8; 3])>,
     pub(super) joint: JointKind,
     pub(super) axis: Vector,
     pub(super) origin: Point,
     pub(super) upper: f64,
     pub(super) handle: Point,
     pub(super) handle_along: Vector,
-    pub(super) base: Bounds,
+    pub(super) base: BoxBounds,
 }
 
-impl Builder {
+impl KitchenBuilder {
     /// A box from its bounds in kitchen coordinates.
-    pub(super) fn shape(&self, bounds: Bounds) -> OrientedBox {
+    pub(super) fn shape(&self, bounds: BoxBounds) -> OrientedBox {
         let middle = Point::from(bounds.map(|b| 0.5 * (b[0] + b[1])));
         OrientedBox {
             center: self.world_from_kitchen * middle,
@@ -113,12 +131,12 @@ impl Builder {
         }
     }
 
-    pub(super) fn block(&self, bounds: Bounds, color: [u8; 3], class: u8) -> Block {
-        Block { shape: self.shape(bounds), color, class }
+    pub(super) fn block(&self, bounds: BoxBounds, color: [u8; 3], class: u8) -> ColoredBox {
+        ColoredBox { shape: self.shape(bounds), color, class }
     }
 
     /// Adds a box that does not move.
-    pub(super) fn fix(&mut self, bounds: Bounds, color: [u8; 3], class: u8) {
+    pub(super) fn fix(&mut self, bounds: BoxBounds, color: [u8; 3], class: u8) {
         let block = self.block(bounds, color, class);
         self.fixed.push(block);
     }
@@ -138,7 +156,7 @@ impl Builder {
     }
 
     /// A front with its handle and joint. `hinge`: `None` slides, else the side seen from the person.
-    fn part(&mut self, noun: &'static str, x: [f64; 2], z: [f64; 2], hinge: Option<Side>, base: Bounds) {
+    fn part(&mut self, noun: &'static str, x: [f64; 2], z: [f64; 2], hinge: Option<HingeEdge>, base: BoxBounds) {
         let class = CLASSES.iter().position(|c| *c == noun).map_or(0, |i| i as u8 + 1);
         let face = DEPTH + BOARD + GAP;
         let (fx, fz) = ([x[0] + 0.5 * GAP, x[1] - 0.5 * GAP], [z[0] + 0.5 * GAP, z[1] - 0.5 * GAP]);
@@ -157,13 +175,13 @@ impl Builder {
             None => (JointKind::Prismatic, (Vector::y(), Point::new(middle_x, face, middle_z))),
         };
         let upper = match hinge {
-            Some(Side::Bottom) => 1.4,
-            Some(Side::Top) => 1.5,
+            Some(HingeEdge::Bottom) => 1.4,
+            Some(HingeEdge::Top) => 1.5,
             Some(_) => 1.7,
             None => 0.42,
         };
         let kind = match (noun, hinge) {
-            ("cupboard", Some(Side::Top)) => "flap",
+            ("cupboard", Some(HingeEdge::Top)) => "flap",
             ("cupboard", _) => "door",
             _ => noun,
         };
@@ -174,7 +192,7 @@ impl Builder {
 
     /// Places a part in the world.
     pub(super) fn add(&mut self, part: Moving) {
-        let whole: Bounds = std::array::from_fn(|i| {
+        let whole: BoxBounds = std::array::from_fn(|i| {
             [
                 part.boxes.iter().map(|(b, _)| b[i][0]).fold(f64::INFINITY, f64::min),
                 part.boxes.iter().map(|(b, _)| b[i][1]).fold(f64::NEG_INFINITY, f64::max),
@@ -200,7 +218,7 @@ impl Builder {
 }
 
 /// Side boards, bottom and back of a drawer behind its front.
-pub(super) fn tray(x: [f64; 2], z: [f64; 2], face: f64) -> [Bounds; 4] {
+pub(super) fn tray(x: [f64; 2], z: [f64; 2], face: f64) -> [BoxBounds; 4] {
     let inner = [x[0] + BOARD + 0.01, x[1] - BOARD - 0.01];
     let (low, high) = (z[0] + BOARD + 0.01, z[0] + BOARD + 0.01 + 0.6 * (z[1] - z[0]));
     let y = [0.06, face - BOARD];
@@ -213,7 +231,7 @@ pub(super) fn tray(x: [f64; 2], z: [f64; 2], face: f64) -> [Bounds; 4] {
 }
 
 /// A handle's bar on a front whose surface is at `face`.
-pub(super) fn bar(hx: f64, hz: f64, face: f64, upright: bool) -> Bounds {
+pub(super) fn bar(hx: f64, hz: f64, face: f64, upright: bool) -> BoxBounds {
     let (bar, thin) = (0.07, 0.006);
     if upright {
         [[hx - thin, hx + thin], [face, face + 0.04], [hz - bar, hz + bar]]
@@ -224,29 +242,29 @@ pub(super) fn bar(hx: f64, hz: f64, face: f64, upright: bool) -> Bounds {
 
 /// Where the handle of a hinged front sits (x, z), and whether its bar is upright. The person looks along -y: their left
 /// is +x.
-pub(super) fn grip(side: Side, fx: [f64; 2], fz: [f64; 2]) -> (f64, f64, bool) {
+pub(super) fn grip(side: HingeEdge, fx: [f64; 2], fz: [f64; 2]) -> (f64, f64, bool) {
     match side {
-        Side::Left => (fx[0] + 0.045, handle_height(fz), true),
-        Side::Right => (fx[1] - 0.045, handle_height(fz), true),
-        Side::Bottom => (0.5 * (fx[0] + fx[1]), fz[1] - 0.05, false),
-        Side::Top => (0.5 * (fx[0] + fx[1]), fz[0] + 0.05, false),
+        HingeEdge::Left => (fx[0] + 0.045, handle_height(fz), true),
+        HingeEdge::Right => (fx[1] - 0.045, handle_height(fz), true),
+        HingeEdge::Bottom => (0.5 * (fx[0] + fx[1]), fz[1] - 0.05, false),
+        HingeEdge::Top => (0.5 * (fx[0] + fx[1]), fz[0] + 0.05, false),
     }
 }
 
 /// Axis and origin of a hinged front. Hinges run along the front edge of the leaf; positive turns the free edge out (+y).
-pub(super) fn hinge_line(side: Side, fx: [f64; 2], fz: [f64; 2], face: f64) -> (Vector, Point) {
+pub(super) fn hinge_line(side: HingeEdge, fx: [f64; 2], fz: [f64; 2], face: f64) -> (Vector, Point) {
     let (middle_x, middle_z) = (0.5 * (fx[0] + fx[1]), 0.5 * (fz[0] + fz[1]));
     match side {
-        Side::Left => (-Vector::z(), Point::new(fx[1], face, middle_z)),
-        Side::Right => (Vector::z(), Point::new(fx[0], face, middle_z)),
-        Side::Bottom => (-Vector::x(), Point::new(middle_x, face, fz[0])),
-        Side::Top => (Vector::x(), Point::new(middle_x, face, fz[1])),
+        HingeEdge::Left => (-Vector::z(), Point::new(fx[1], face, middle_z)),
+        HingeEdge::Right => (Vector::z(), Point::new(fx[0], face, middle_z)),
+        HingeEdge::Bottom => (-Vector::x(), Point::new(middle_x, face, fz[0])),
+        HingeEdge::Top => (Vector::x(), Point::new(middle_x, face, fz[1])),
     }
 }
 
 /// Where the hinge is, seen by the person who stands before the furniture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Side {
+pub(super) enum HingeEdge {
     Left,
     Right,
     Top,
@@ -264,88 +282,106 @@ fn handle_height(z: [f64; 2]) -> f64 {
     }
 }
 
+/// Bottom and top of base furniture, metres.
+const BASE_Z: [f64; 2] = [0.1, 0.82];
+
 /// Builds a kitchen.
 #[must_use]
 pub fn build(rng: &mut Pcg64Mcg) -> Kitchen {
     let yaw = rng.random_range(-3.1..3.1);
     let place = Vector::new(rng.random_range(-3.0..3.0), rng.random_range(-3.0..3.0), rng.random_range(-0.5..0.5));
-    let palettes = [[196, 164, 122], [226, 226, 222], [104, 128, 118], [168, 176, 186], [150, 108, 78]];
     let world_from_kitchen = Pose::from_parts(place.into(), rotation(&Vector::z(), yaw));
-    let front = palettes[rng.random_range(0..palettes.len())];
-    let mut b = Builder { world_from_kitchen, fixed: Vec::new(), parts: Vec::new(), front };
-
-    let (low, high) = (0.1, 0.82);
-    let mut x = 0.0;
-    let mut units: Vec<u8> = vec![0, 1, 2, 1, 0];
-    // Any order of drawers (0), doors (1) and the dishwasher (2).
-    for i in (1..units.len()).rev() {
-        units.swap(i, rng.random_range(0..=i));
-    }
-    for unit in units {
-        let width = if unit == 2 { 0.6 } else { [0.4, 0.5, 0.6][rng.random_range(0..3)] };
-        let span = [x, x + width];
-        let base = [span, [0.0, DEPTH], [low, high]];
-        match unit {
-            0 => {
-                let heights: &[f64] = if rng.random_bool(0.5) { &[0.18, 0.54] } else { &[0.16, 0.24, 0.32] };
-                let mut top = high;
-                for h in heights {
-                    let z = [top - h, top];
-                    b.carcass(span, [0.0, DEPTH], z, 1);
-                    b.part("drawer", span, z, None, [span, [0.0, DEPTH], z]);
-                    top -= h;
-                }
-            }
-            1 => {
-                b.carcass(span, [0.0, DEPTH], [low, high], 2);
-                let side = if rng.random_bool(0.5) { Side::Left } else { Side::Right };
-                b.part("cupboard", span, [low, high], Some(side), base);
-            }
-            _ => {
-                b.carcass(span, [0.0, DEPTH], [low, high], 4);
-                b.part("dishwasher", span, [low, high], Some(Side::Bottom), base);
-            }
-        }
-        x += width;
-    }
-    let row = x;
-    // Wall cupboards over part of the row; some open upwards.
-    let mut upper_x = 0.1;
-    while upper_x + 0.5 < row - 0.3 {
-        let width = [0.4, 0.5][rng.random_range(0..2)];
-        let (span, z) = ([upper_x, upper_x + width], [1.38, 2.02]);
-        let side = [Side::Left, Side::Right, Side::Top][rng.random_range(0..3)];
-        b.wall_cupboard(span, z, side);
-        upper_x += width;
-    }
+    let front = FRONTS[rng.random_range(0..FRONTS.len())];
+    let mut b = KitchenBuilder { world_from_kitchen, fixed: Vec::new(), parts: Vec::new(), front };
+    let row = b.base_row(rng);
+    b.wall_row(row, rng);
     // The fridge at the end of the row: a freezer door below, the fridge door above.
     let span = [row, row + 0.6];
     for (z, side) in [([0.1, 0.72], rng.random_bool(0.5)), ([0.72, 1.95], rng.random_bool(0.5))] {
         b.carcass(span, [0.0, DEPTH], z, 3);
-        b.part("fridge", span, z, Some(if side { Side::Left } else { Side::Right }), [span, [0.0, DEPTH], z]);
+        let side = if side { HingeEdge::Left } else { HingeEdge::Right };
+        b.part("fridge", span, z, Some(side), [span, [0.0, DEPTH], z]);
     }
     // A sideboard across the room, turned against it: nothing about it follows the room's directions.
     b.sideboard(rng);
-    // Worktop, plinth, wall, floor, and a few things on the worktop.
-    let far = [-1.5, row + 2.1];
-    for (bounds, color) in [
-        ([[0.0, row], [0.0, DEPTH + 0.03], [high, high + 0.04]], [70, 66, 64]),
-        ([[0.0, row + 0.6], [0.0, DEPTH - 0.05], [0.0, low]], [60, 60, 62]),
-        ([far, [-0.05, 0.0], [0.0, 2.6]], [206, 204, 196]),
-        ([far, [-0.05, 5.0], [-0.05, 0.0]], [150, 146, 140]),
-    ] {
-        b.fix(bounds, color, 0);
-    }
-    for _ in 0..4 {
-        let (px, py) = (rng.random_range(0.1..row - 0.2), rng.random_range(0.1..0.35));
-        let (w, h) = (rng.random_range(0.04..0.1), rng.random_range(0.08..0.28));
-        let color = [rng.random_range(60..220u8), rng.random_range(60..220u8), rng.random_range(60..220u8)];
-        b.fix([[px, px + w], [py, py + w], [high + 0.04, high + 0.04 + h]], color, 0);
-    }
+    b.surroundings(row, rng);
     Kitchen { fixed: b.fixed, parts: b.parts, classes: &CLASSES }
 }
 
-impl Builder {
+impl KitchenBuilder {
+    /// Base furniture side by side from x = 0; returns where the row ends.
+    fn base_row(&mut self, rng: &mut Pcg64Mcg) -> f64 {
+        let [low, high] = BASE_Z;
+        let mut x = 0.0;
+        let mut units: Vec<u8> = vec![0, 1, 2, 1, 0];
+        // Any order of drawers (0), doors (1) and the dishwasher (2).
+        for i in (1..units.len()).rev() {
+            units.swap(i, rng.random_range(0..=i));
+        }
+        for unit in units {
+            let width = if unit == 2 { 0.6 } else { [0.4, 0.5, 0.6][rng.random_range(0..3)] };
+            let span = [x, x + width];
+            let base = [span, [0.0, DEPTH], [low, high]];
+            match unit {
+                0 => {
+                    let heights: &[f64] = if rng.random_bool(0.5) { &[0.18, 0.54] } else { &[0.16, 0.24, 0.32] };
+                    let mut top = high;
+                    for h in heights {
+                        let z = [top - h, top];
+                        self.carcass(span, [0.0, DEPTH], z, 1);
+                        self.part("drawer", span, z, None, [span, [0.0, DEPTH], z]);
+                        top -= h;
+                    }
+                }
+                1 => {
+                    self.carcass(span, [0.0, DEPTH], [low, high], 2);
+                    let side = if rng.random_bool(0.5) { HingeEdge::Left } else { HingeEdge::Right };
+                    self.part("cupboard", span, [low, high], Some(side), base);
+                }
+                _ => {
+                    self.carcass(span, [0.0, DEPTH], [low, high], 4);
+                    self.part("dishwasher", span, [low, high], Some(HingeEdge::Bottom), base);
+                }
+            }
+            x += width;
+        }
+        x
+    }
+
+    /// Wall cupboards over part of a row that ends at `row`; some open upwards.
+    fn wall_row(&mut self, row: f64, rng: &mut Pcg64Mcg) {
+        let mut x = 0.1;
+        while x + 0.5 < row - 0.3 {
+            let width = [0.4, 0.5][rng.random_range(0..2)];
+            let (span, z) = ([x, x + width], [1.38, 2.02]);
+            let side = [HingeEdge::Left, HingeEdge::Right, HingeEdge::Top][rng.random_range(0..3)];
+            self.wall_cupboard(span, z, side);
+            x += width;
+        }
+    }
+
+    /// Worktop, plinth, wall, floor, and a few things on the worktop of a row that ends at `row`.
+    fn surroundings(&mut self, row: f64, rng: &mut Pcg64Mcg) {
+        let [low, high] = BASE_Z;
+        let far = [-1.5, row + 2.1];
+        for (bounds, color) in [
+            ([[0.0, row], [0.0, DEPTH + 0.03], [high, high + 0.04]], STONE),
+            ([[0.0, row + 0.6], [0.0, DEPTH - 0.05], [0.0, low]], PLINTH),
+            ([far, [-0.05, 0.0], [0.0, 2.6]], WALL),
+            ([far, [-0.05, 5.0], [-0.05, 0.0]], FLOOR),
+        ] {
+            self.fix(bounds, color, 0);
+        }
+        for _ in 0..4 {
+            let (px, py) = (rng.random_range(0.1..row - 0.2), rng.random_range(0.1..0.35));
+            let (w, h) = (rng.random_range(0.04..0.1), rng.random_range(0.08..0.28));
+            let color = [rng.random_range(60..220u8), rng.random_range(60..220u8), rng.random_range(60..220u8)];
+            self.fix([[px, px + w], [py, py + w], [high + 0.04, high + 0.04 + h]], color, 0);
+        }
+    }
+}
+
+impl KitchenBuilder {
     /// A low cupboard and a drawer side by side, standing free, turned by 15 to 75 degrees.
     fn sideboard(&mut self, rng: &mut Pcg64Mcg) {
         let here = self.world_from_kitchen;
@@ -353,7 +389,7 @@ impl Builder {
         self.world_from_kitchen = here * Pose::from_parts(Vector::new(-1.4, 2.4, 0.0).into(), turn);
         let (left, right, z) = ([0.0, 0.5], [0.5, 1.0], [0.08, 0.6]);
         let base = |span: [f64; 2]| [span, [0.0, DEPTH], z];
-        let side = if rng.random_bool(0.5) { Side::Left } else { Side::Right };
+        let side = if rng.random_bool(0.5) { HingeEdge::Left } else { HingeEdge::Right };
         self.carcass(left, [0.0, DEPTH], z, 2);
         self.part("cupboard", left, z, Some(side), base(left));
         self.carcass(right, [0.0, DEPTH], z, 1);
@@ -362,7 +398,7 @@ impl Builder {
     }
 
     /// A shallow cupboard on the wall whose front is in the plane of its own carcass.
-    fn wall_cupboard(&mut self, x: [f64; 2], z: [f64; 2], side: Side) {
+    fn wall_cupboard(&mut self, x: [f64; 2], z: [f64; 2], side: HingeEdge) {
         // Wall furniture is 0.35 m deep; shifting the frame keeps all fronts built by one rule.
         let shift = Pose::translation(0.0, 0.35 - DEPTH, 0.0);
         let here = self.world_from_kitchen;
@@ -378,7 +414,7 @@ impl Kitchen {
     /// All boxes with the parts at the given openings and the hand's boxes. `swallowed`: a part whose furniture shows
     /// another mask class.
     #[must_use]
-    pub fn posed(&self, openings: &[f64], hand: &[OrientedBox], swallowed: Option<(usize, u8)>) -> Vec<Block> {
+    pub fn posed(&self, openings: &[f64], hand: &[OrientedBox], swallowed: Option<(usize, u8)>) -> Vec<ColoredBox> {
         let mut blocks = self.fixed.clone();
         if let Some((part, class)) = swallowed.and_then(|(index, class)| Some((self.parts.get(index)?, class))) {
             for block in blocks.iter_mut().filter(|b| b.class != 0 && part.base.contains(&b.shape.center)) {
@@ -388,20 +424,20 @@ impl Kitchen {
         for (index, (part, opening)) in self.parts.iter().zip(openings).enumerate() {
             let motion = part.articulation.motion(*opening);
             let class = swallowed.filter(|(swallowed, _)| *swallowed == index).map(|(_, class)| class);
-            blocks.extend(part.blocks.iter().map(|b| Block {
+            blocks.extend(part.blocks.iter().map(|b| ColoredBox {
                 shape: b.shape.moved(&motion),
                 class: class.unwrap_or(b.class),
                 ..*b
             }));
         }
-        blocks.extend(hand.iter().map(|h| Block { shape: *h, color: [206, 150, 120], class: HAND_CLASS }));
+        blocks.extend(hand.iter().map(|h| ColoredBox { shape: *h, color: [206, 150, 120], class: HAND_CLASS }));
         blocks
     }
 
     /// The same kitchen moved as a whole.
     #[must_use]
     pub fn moved(&self, motion: &Pose) -> Self {
-        let block = |b: &Block| Block { shape: b.shape.moved(motion), ..*b };
+        let block = |b: &ColoredBox| ColoredBox { shape: b.shape.moved(motion), ..*b };
         let part = |p: &OpenPart| OpenPart {
             articulation: Articulation {
                 axis: motion * p.articulation.axis,

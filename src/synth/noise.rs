@@ -6,10 +6,9 @@ use rand_pcg::Pcg64Mcg;
 
 use super::kitchen::Kitchen;
 use super::person::Take;
-use super::render::{Picture, blur};
-use super::tiers;
-use super::{Changes, Tier};
-use crate::math::{Point, Pose, Vector, unit};
+use super::render::{Rendering, blur};
+use super::variants::{Changes, Tier};
+use crate::math::{Point, Pose, Vector};
 use crate::recording::{Camera, HAND_CLASS};
 
 /// A hand as an estimator sees it.
@@ -27,7 +26,7 @@ pub struct SeenHand {
 
 /// What the estimators report.
 #[derive(Debug, Clone)]
-pub struct Seen {
+pub struct Observed {
     /// Camera poses.
     pub poses: Vec<Pose>,
     /// Hands.
@@ -81,8 +80,8 @@ pub struct PixelSizes {
 const PIXELS: PixelSizes =
     PixelSizes { depth: 0.004, grain: 3.0, contrast: 1.0, blur_px: 0.0, normal_rad: 0.0, normal_frame_rad: 0.0 };
 
-/// Sizes of all errors.
-struct Sizes {
+/// Sizes of all errors but the pixels'.
+struct HandErrors {
     pose_m: f64,
     pose_rad: f64,
     hand_white_m: f64,
@@ -97,9 +96,9 @@ struct Sizes {
 }
 
 /// Realistic errors: about those of current hand, pose and metric-depth estimators on head-worn video.
-fn sizes(tier: Tier, changes: &Changes) -> Sizes {
+fn sizes(tier: Tier, changes: &Changes) -> HandErrors {
     let mut s = match tier {
-        Tier::Clean => Sizes {
+        Tier::Clean => HandErrors {
             pose_m: 0.0,
             pose_rad: 0.0,
             hand_white_m: 0.002,
@@ -112,7 +111,7 @@ fn sizes(tier: Tier, changes: &Changes) -> Sizes {
             depth_scale: 0.0,
             depth_frame: 0.0,
         },
-        Tier::Realistic => Sizes {
+        Tier::Realistic => HandErrors {
             pose_m: 0.004,
             pose_rad: 0.004,
             hand_white_m: 0.004,
@@ -126,7 +125,7 @@ fn sizes(tier: Tier, changes: &Changes) -> Sizes {
             depth_frame: 0.01,
         },
         // The benchmark's tiers have their own table and are not observed here.
-        _ => Sizes {
+        _ => HandErrors {
             pose_m: 0.006,
             pose_rad: 0.006,
             hand_white_m: 0.006,
@@ -157,20 +156,20 @@ pub(super) fn chance(rng: &mut Pcg64Mcg, share: f64) -> bool {
     rng.random::<f64>() < share
 }
 
-fn normal3(rng: &mut Pcg64Mcg) -> Vector {
+pub(super) fn normal3(rng: &mut Pcg64Mcg) -> Vector {
     Vector::new(normal(rng), normal(rng), normal(rng))
 }
 
 /// What the estimators make of a take.
 #[must_use]
-pub fn observe(take: &Take, tier: Tier, changes: &Changes, rng: &mut Pcg64Mcg) -> Seen {
+pub fn observe(take: &Take, tier: Tier, changes: &Changes, rng: &mut Pcg64Mcg) -> Observed {
     let s = sizes(tier, changes);
     // Correlation time of hand and pose errors.
     const TAU_SECS: f64 = 0.3;
     let scale = 1.0 + s.depth_scale * normal(rng);
     let bias = s.ray_bias * normal(rng);
     let (mut drift, mut turn, mut hand_error) = (Vector::zeros(), Vector::zeros(), Vector::zeros());
-    let mut seen = Seen {
+    let mut seen = Observed {
         poses: Vec::new(),
         hands: Vec::new(),
         depth_scale: Vec::new(),
@@ -219,127 +218,6 @@ pub fn observe(take: &Take, tier: Tier, changes: &Changes, rng: &mut Pcg64Mcg) -
     seen
 }
 
-/// Correlation time of the slowly varying errors of hands, and of poses.
-const HAND_TAU_SECS: f64 = 0.2;
-const POSE_TAU_SECS: f64 = 0.3;
-/// Mean duration of a burst of frames without a hand.
-const BURST_SECS: f64 = 0.4;
-/// How far off outliers are.
-const OUTLIER_M: [f64; 2] = [0.1, 0.3];
-/// The width for which blurs are given.
-const BLUR_WIDTH_PX: f64 = 320.0;
-
-/// Errors that stay the same for a clip.
-struct PerClip {
-    depth_scale: f64,
-    depth_tilt: [f64; 2],
-    ray_bias: f64,
-    /// When contact is seen to begin and to end.
-    contact_secs: [f64; 2],
-    /// No hand is seen at the moment.
-    is_dropped: bool,
-}
-
-/// What the estimators make of a take on a tier of the benchmark. The number of draws does not depend on the sizes.
-#[must_use]
-pub fn observe_benchmark(take: &Take, camera: &Camera, s: &tiers::Sizes, rng: &mut Pcg64Mcg) -> Seen {
-    let mut seen = Seen {
-        poses: Vec::new(),
-        hands: Vec::new(),
-        depth_scale: Vec::new(),
-        depth_tilt: Vec::new(),
-        masks: vec![MaskError::NONE; take.frames.len()],
-        pixel_seed: Some(rng.random()),
-        pixels: PixelSizes {
-            depth: s.depth_pixel as f32,
-            grain: s.grain as f32,
-            contrast: s.contrast,
-            blur_px: s.blur_px * camera.width as f64 / BLUR_WIDTH_PX,
-            normal_rad: s.normal_pixel_rad,
-            normal_frame_rad: s.normal_frame_rad,
-        },
-    };
-    let segments = take.segments();
-    let mut clip = per_clip(take, segments.first().copied().flatten(), s, rng);
-    let (mut place, mut turn, mut slow) = (normal3(rng), normal3(rng), normal3(rng));
-    let mut last: Option<(f64, Option<usize>)> = None;
-    for (frame, (truth, segment)) in take.frames.iter().zip(&segments).enumerate() {
-        if last.is_some_and(|(_, before)| before != *segment) {
-            clip = per_clip(take, *segment, s, rng);
-        }
-        let gap = last.map_or(0.0, |(time, _)| truth.time_secs - time);
-        last = Some((truth.time_secs, *segment));
-        place = carried(&place, gap / POSE_TAU_SECS, rng);
-        turn = carried(&turn, gap / POSE_TAU_SECS, rng);
-        slow = carried(&slow, gap / HAND_TAU_SECS, rng);
-        let pose = truth.world_from_camera;
-        let seen_pose = Pose::from_parts(
-            (pose.translation.vector + place * s.pose_m).into(),
-            nalgebra::UnitQuaternion::from_scaled_axis(turn * s.pose_rad) * pose.rotation,
-        );
-        seen.poses.push(seen_pose);
-        seen.depth_scale.push(clip.depth_scale * (1.0 + s.depth_frame * normal(rng)));
-        seen.depth_tilt.push(clip.depth_tilt);
-        let Some((grasp, wrist)) = truth.grasp else { continue };
-        // A chain of two states with the wanted mean duration of a burst and share of frames.
-        let ends = (gap / BURST_SECS).min(0.5);
-        let begins = if s.dropout < 1.0 { (ends * s.dropout / (1.0 - s.dropout)).min(1.0) } else { 1.0 };
-        let draw: f64 = rng.random();
-        clip.is_dropped = if clip.is_dropped { draw >= ends } else { draw < begins };
-        let (is_flipped, is_outlier) = (chance(rng, s.contact_flips), chance(rng, s.outliers));
-        let size: f64 = rng.random();
-        let (far, white) = (normal3(rng), normal3(rng));
-        let in_view = camera.project(&(pose.inverse() * grasp)).is_some_and(|(u, v)| camera.contains(u, v));
-        if clip.is_dropped || !in_view {
-            continue;
-        }
-        let to_hand = grasp - pose.translation.vector;
-        let ray = unit(&to_hand.coords).unwrap_or_else(Vector::x);
-        let along = ray.dot(&slow);
-        let mut error = ray * (along * s.hand_ray_m) + (slow - ray * along) * s.hand_lateral_m;
-        error += ray * (clip.ray_bias * to_hand.coords.norm()) + white * s.hand_white_m;
-        if is_outlier {
-            let distance = OUTLIER_M[0] + (OUTLIER_M[1] - OUTLIER_M[0]) * size;
-            error += unit(&far).unwrap_or_else(Vector::x) * distance;
-        }
-        // Hands are found in the camera's frame: they inherit the error of its pose.
-        let moved = seen_pose * pose.inverse();
-        let [begin, end] = clip.contact_secs;
-        let in_contact = (begin..=end).contains(&truth.time_secs);
-        seen.hands.push(SeenHand {
-            frame,
-            grasp: moved * (grasp + error),
-            wrist: moved * (wrist + error),
-            contact: in_contact != is_flipped,
-        });
-    }
-    seen
-}
-
-fn per_clip(take: &Take, clip: Option<usize>, s: &tiers::Sizes, rng: &mut Pcg64Mcg) -> PerClip {
-    // Half a frame to each side belongs to a frame.
-    const HALF_FRAME: f64 = 0.5 / super::person::FPS;
-    let frames = clip.and_then(|i| take.clips.get(i)).and_then(|c| take.frames.get(c.true_span[0]..=c.true_span[1]));
-    let held = || frames.unwrap_or_default().iter().filter(|f| f.contact).map(|f| f.time_secs);
-    let (first, last) = (held().next().unwrap_or(f64::INFINITY), held().next_back().unwrap_or(f64::NEG_INFINITY));
-    PerClip {
-        depth_scale: 1.0 + s.depth_scale * normal(rng),
-        depth_tilt: [s.depth_tilt * normal(rng), s.depth_tilt * normal(rng)],
-        ray_bias: s.ray_bias * normal(rng),
-        contact_secs: [
-            first - HALF_FRAME + s.boundary_secs * normal(rng),
-            last + HALF_FRAME + s.boundary_secs * normal(rng),
-        ],
-        is_dropped: chance(rng, s.dropout),
-    }
-}
-
-/// A stationary unit error after some correlation times.
-fn carried(error: &Vector, times: f64, rng: &mut Pcg64Mcg) -> Vector {
-    let keep = (-times).exp();
-    error * keep + normal3(rng) * (1.0 - keep * keep).sqrt()
-}
-
 /// In a share `wrong` of clips the masks give the touched part's class to the nearest part of another class; all masks of
 /// a clip are scaled about the touched part.
 #[must_use]
@@ -371,7 +249,7 @@ pub fn mask_errors(kitchen: &Kitchen, take: &Take, wrong: f64, scale: f64, rng: 
 }
 
 /// Keeps `count` hand samples with contact of each clip, chosen at random, and no others.
-pub fn keep_few(seen: &mut Seen, take: &Take, count: usize, rng: &mut Pcg64Mcg) {
+pub fn keep_few(seen: &mut Observed, take: &Take, count: usize, rng: &mut Pcg64Mcg) {
     let mut kept: Vec<SeenHand> = Vec::new();
     for clip in take.clips.iter().filter(|c| c.part.is_some()) {
         let span = clip.true_span[0]..=clip.true_span[1];
@@ -402,7 +280,7 @@ pub fn scaled(classes: &[u8], camera: &Camera, about: (f64, f64), scale: f64) ->
 }
 
 /// Errors of depth, image and normals of a rendered frame.
-pub fn degrade(picture: &mut Picture, seen: &Seen, frame: usize, camera: &Camera, with_normals: bool) {
+pub fn degrade(picture: &mut Rendering, seen: &Observed, frame: usize, camera: &Camera, with_normals: bool) {
     let scale = seen.depth_scale[frame] as f32;
     for z in &mut picture.depth {
         *z *= scale;
@@ -438,7 +316,7 @@ pub fn degrade(picture: &mut Picture, seen: &Seen, frame: usize, camera: &Camera
 }
 
 /// Normals stay as they are where an error would turn them away from the camera.
-fn turn_normals(picture: &mut Picture, camera: &Camera, sizes: &PixelSizes, rng: &mut Pcg64Mcg) {
+fn turn_normals(picture: &mut Rendering, camera: &Camera, sizes: &PixelSizes, rng: &mut Pcg64Mcg) {
     let bias = nalgebra::UnitQuaternion::from_scaled_axis(normal3(rng) * sizes.normal_frame_rad);
     for (i, n) in picture.normals.iter_mut().enumerate() {
         if *n == [0.0; 3] {
@@ -459,7 +337,9 @@ mod tests {
     use super::*;
     use crate::articulation::Action;
     use crate::math::stats;
-    use crate::synth::person::{TrueClip, TrueFrame};
+    use crate::synth::benchmark::{self, BURST_SECS};
+    use crate::synth::person::{TakeClip, TrueFrame};
+    use crate::synth::tiers;
 
     const CAMERA: Camera = Camera { width: 64, height: 48, fx: 32.0, fy: 32.0, cx: 31.5, cy: 23.5 };
     const CLIPS: usize = 800;
@@ -481,7 +361,7 @@ mod tests {
                 });
             }
             let span = [clip * LENGTH, (clip + 1) * LENGTH - 1];
-            take.clips.push(TrueClip {
+            take.clips.push(TakeClip {
                 span,
                 true_span: span,
                 part: Some("part".to_owned()),
@@ -508,7 +388,7 @@ mod tests {
         let take = resting();
         for tier in [Tier::T0, Tier::T1, Tier::T2, Tier::Hd, Tier::T3, Tier::Short, Tier::Nonm] {
             let s = tiers::sizes(tier, &Changes::default()).unwrap();
-            let mut seen = observe_benchmark(&take, &CAMERA, &s, &mut Pcg64Mcg::seed_from_u64(1));
+            let mut seen = benchmark::observe(&take, &CAMERA, &s, &mut Pcg64Mcg::seed_from_u64(1));
             let say = |what: &str| format!("{tier:?}, {what}");
             let count = (CLIPS * LENGTH) as f64;
             near(1.0 - seen.hands.len() as f64 / count, s.dropout, 0.1, &say("dropout"));
@@ -557,7 +437,7 @@ mod tests {
     #[test]
     fn hands_are_lost_in_bursts() {
         let s = tiers::sizes(Tier::T2, &Changes::default()).unwrap();
-        let seen = observe_benchmark(&resting(), &CAMERA, &s, &mut Pcg64Mcg::seed_from_u64(3));
+        let seen = benchmark::observe(&resting(), &CAMERA, &s, &mut Pcg64Mcg::seed_from_u64(3));
         let mut is_seen = vec![false; CLIPS * LENGTH];
         seen.hands.iter().for_each(|h| is_seen[h.frame] = true);
         // Whether the frame after a lost one is lost, too: by chance alone it would be so in 40 %.
@@ -572,7 +452,7 @@ mod tests {
             let changes = Changes { hand_noise_m: Some(0.05), depth_bias: Some(0.0), ..Changes::default() };
             let rng = &mut Pcg64Mcg::seed_from_u64(4);
             let seen = match tiers::sizes(tier, &changes) {
-                Some(s) => observe_benchmark(&resting(), &CAMERA, &s, rng),
+                Some(s) => benchmark::observe(&resting(), &CAMERA, &s, rng),
                 None => observe(&resting(), tier, &changes, rng),
             };
             let sizes = seen.hands.iter().map(|h| (h.grasp - Point::new(0.0, 0.0, 1.0)).norm_squared());

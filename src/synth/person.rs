@@ -6,7 +6,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::kitchen::{Kitchen, OpenPart, limb};
 use crate::articulation::{Action, JointKind};
-use crate::math::{Point, Pose, Vector};
+use crate::math::{Point, Pose, Vector, unit};
 use crate::twin::OrientedBox;
 
 /// One frame as it really was.
@@ -28,9 +28,32 @@ pub struct TrueFrame {
     pub is_still: bool,
 }
 
+impl TrueFrame {
+    /// A frame with a hand, which reaches from the shoulder to its grasp.
+    pub(super) fn with_hand(
+        time_secs: f64,
+        world_from_camera: Pose,
+        openings: &[f64],
+        grasp: Point,
+        shoulder: &Point,
+        contact: bool,
+    ) -> Self {
+        let wrist = grasp + unit(&(shoulder - grasp)).unwrap_or_else(Vector::z) * 0.16;
+        Self {
+            time_secs,
+            world_from_camera,
+            openings: openings.to_vec(),
+            hand: vec![limb(&grasp, &wrist, 0.035), limb(&wrist, shoulder, 0.04)],
+            grasp: Some((grasp, wrist)),
+            contact,
+            is_still: false,
+        }
+    }
+}
+
 /// A narrated segment.
 #[derive(Debug, Clone)]
-pub struct TrueClip {
+pub struct TakeClip {
     /// First and last frame as narrated.
     pub span: [usize; 2],
     /// First and last frame of reach, motion and withdrawal.
@@ -47,7 +70,7 @@ pub struct TrueClip {
     pub noun: String,
 }
 
-impl TrueClip {
+impl TakeClip {
     /// A narration that moves no joint, at a frame.
     pub(super) fn distraction(frame: usize) -> Self {
         Self {
@@ -60,6 +83,20 @@ impl TrueClip {
             noun: "hands".to_owned(),
         }
     }
+
+    /// An interaction with a part, of `total` frames from `first` on: the narration leaves out half of reach and withdrawal.
+    pub(super) fn of_part(part: &OpenPart, action: Action, first: usize, total: usize) -> Self {
+        let verb = if action == Action::Open { "open" } else { "close" };
+        Self {
+            span: [first + REACH / 2, first + total - 1 - LEAVE / 2],
+            true_span: [first, first + total - 1],
+            part: Some(part.id.clone()),
+            action: Some(action),
+            narration: format!("{verb} the {}", part.noun),
+            verb: verb.to_owned(),
+            noun: part.noun.to_owned(),
+        }
+    }
 }
 
 /// The whole take.
@@ -68,7 +105,7 @@ pub struct Take {
     /// Frames in time order.
     pub frames: Vec<TrueFrame>,
     /// Clips.
-    pub clips: Vec<TrueClip>,
+    pub clips: Vec<TakeClip>,
 }
 
 /// Frames a second during interactions.
@@ -80,8 +117,8 @@ pub(super) const LEAVE: usize = 8;
 /// A camera at `eye` that looks at `target`, upright.
 #[must_use]
 pub fn look_at(eye: &Point, target: &Point) -> Pose {
-    let forward = crate::math::unit(&(target - eye)).unwrap_or_else(Vector::x);
-    let right = crate::math::unit(&forward.cross(&Vector::z())).unwrap_or_else(Vector::x);
+    let forward = unit(&(target - eye)).unwrap_or_else(Vector::x);
+    let right = unit(&forward.cross(&Vector::z())).unwrap_or_else(Vector::x);
     let down = forward.cross(&right);
     let matrix = Matrix3::from_columns(&[right, down, forward]);
     Pose::from_parts(eye.coords.into(), UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix)))
@@ -93,14 +130,47 @@ pub(super) fn smooth_step(s: f64) -> f64 {
     s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s)
 }
 
-/// Plays a take: a look around, then each chosen part opened and closed, with a distractor in between. A `hard` take has
-/// short motions and vague, shifted narrations.
+/// Where the hand is in frame `i` of a clip whose part moves for `moving` frames: it reaches from `rest` to where it would
+/// hold the part, holds it, and goes back.
+pub(super) fn grasp_in(i: usize, moving: usize, rest: &Point, held: &Point) -> Point {
+    if i < REACH {
+        rest + (held - rest) * smooth_step((i + 1) as f64 / REACH as f64)
+    } else if i >= REACH + moving {
+        held + (rest - held) * smooth_step((i + 1 - REACH - moving) as f64 / LEAVE as f64)
+    } else {
+        *held
+    }
+}
+
+/// How a head that stands still moves, metres; time in seconds.
+pub(super) fn sway(time: f64) -> Vector {
+    Vector::new(0.01 * (1.7 * time).sin(), 0.01 * (1.3 * time).cos(), 0.005 * (2.1 * time).sin())
+}
+
+/// The shoulder below and beside the eyes; `along` points to the side.
+pub(super) fn shoulder_of(eye: &Point, along: &Vector) -> Point {
+    eye - Vector::z() * 0.28 + along * 0.15
+}
+
+/// Where a hand rests that does nothing, before furniture whose front faces `out`.
+pub(super) fn rest_of(shoulder: &Point, out: &Vector) -> Point {
+    shoulder + out * -0.15 - Vector::z() * 0.25
+}
+
+/// Who does it and what is opened: the same in all takes of a kitchen.
+#[derive(Debug, Clone)]
+pub struct TakePlan {
+    /// Height of the eyes, world, metres.
+    eye_height: f64,
+    /// All parts in some order.
+    order: Vec<usize>,
+    /// Parts that are opened and closed.
+    chosen: Vec<usize>,
+}
+
+/// Chooses a person and `count` parts: every kind of part once before any kind twice.
 #[must_use]
-pub fn play(kitchen: &Kitchen, count: usize, hard: bool, rng: &mut Pcg64Mcg) -> Take {
-    let mut take = Take::default();
-    let mut openings = vec![0.0; kitchen.parts.len()];
-    let mut time = 0.0;
-    let floor = 0.0f64;
+pub fn choose(kitchen: &Kitchen, count: usize, rng: &mut Pcg64Mcg) -> TakePlan {
     let base = kitchen
         .parts
         .iter()
@@ -108,8 +178,7 @@ pub fn play(kitchen: &Kitchen, count: usize, hard: bool, rng: &mut Pcg64Mcg) -> 
         .map(|p| p.z)
         .fold(f64::INFINITY, f64::min)
         - 0.1;
-    let eye_height = base + floor + rng.random_range(1.5..1.72);
-    // Every kind of part once before any kind twice.
+    let eye_height = base + rng.random_range(1.5..1.72);
     let mut order: Vec<usize> = (0..kitchen.parts.len()).collect();
     for i in (1..order.len()).rev() {
         order.swap(i, rng.random_range(0..=i));
@@ -129,51 +198,133 @@ pub fn play(kitchen: &Kitchen, count: usize, hard: bool, rng: &mut Pcg64Mcg) -> 
         }
     }
 
-    // The look around: each part that will be used, and its neighbours, from a few places.
-    for view in 0..18 {
-        let part = &kitchen.parts
-            [if view < 2 * chosen.len() { chosen[view % chosen.len()] } else { order[view % order.len()] }];
-        let along = Vector::z().cross(&part.out);
-        let side = along * rng.random_range(-0.7..0.7);
-        let mut eye = part.handle + part.out * rng.random_range(0.9..1.6) + side;
-        eye.z = eye_height + rng.random_range(-0.1..0.1);
-        let target = part.handle + along * rng.random_range(-0.2..0.2) - Vector::z() * rng.random_range(0.0..0.25);
-        take.still(time, look_at(&eye, &target), &openings);
-        time += 0.5;
+    TakePlan { eye_height, order, chosen }
+}
+
+/// Plays a take: a look around, then each chosen part opened and closed, with a distractor in between. A `hard` take has
+/// short motions and vague, shifted narrations.
+#[must_use]
+pub fn play(kitchen: &Kitchen, plan: &TakePlan, hard: bool, rng: &mut Pcg64Mcg) -> Take {
+    let openings = vec![0.0; kitchen.parts.len()];
+    let mut player = TakePlayer { kitchen, plan, take: Take::default(), openings, time: 0.0, rng };
+    player.look_around();
+    for (n, &index) in plan.chosen.iter().enumerate() {
+        player.open_and_close(index, hard);
+        if n == 0 {
+            let last = player.take.frames.len() - 1;
+            player.take.clips.push(TakeClip::distraction(last));
+        }
     }
-    for (n, &index) in chosen.iter().enumerate() {
-        let part = &kitchen.parts[index];
-        let share = if hard { rng.random_range(0.3..0.75) } else { rng.random_range(0.6..0.95) };
+    player.take
+}
+
+/// A take under way.
+struct TakePlayer<'a> {
+    kitchen: &'a Kitchen,
+    plan: &'a TakePlan,
+    take: Take,
+    /// Of every part, rad or m.
+    openings: Vec<f64>,
+    /// Seconds.
+    time: f64,
+    rng: &'a mut Pcg64Mcg,
+}
+
+impl TakePlayer<'_> {
+    /// Each part that will be used, and its neighbours, from a few places.
+    fn look_around(&mut self) {
+        let TakePlan { eye_height, order, chosen } = self.plan;
+        for view in 0..18 {
+            let part = &self.kitchen.parts
+                [if view < 2 * chosen.len() { chosen[view % chosen.len()] } else { order[view % order.len()] }];
+            let along = Vector::z().cross(&part.out);
+            let side = along * self.rng.random_range(-0.7..0.7);
+            let mut eye = part.handle + part.out * self.rng.random_range(0.9..1.6) + side;
+            eye.z = eye_height + self.rng.random_range(-0.1..0.1);
+            let target =
+                part.handle + along * self.rng.random_range(-0.2..0.2) - Vector::z() * self.rng.random_range(0.0..0.25);
+            self.take.still(self.time, look_at(&eye, &target), &self.openings);
+            self.time += 0.5;
+        }
+    }
+
+    /// A part opened, then closed, with two stills after each.
+    fn open_and_close(&mut self, index: usize, hard: bool) {
+        let share = if hard { self.rng.random_range(0.3..0.75) } else { self.rng.random_range(0.6..0.95) };
         // People open a drawer or a dishwasher as far as they need, a door about as far as a right angle.
-        let target = (share * part.upper).min(1.5);
+        let target = (share * self.kitchen.parts[index].upper).min(1.5);
         for action in [Action::Open, Action::Close] {
-            take.clip(
-                part,
-                index,
-                action,
-                target,
-                eye_height,
-                &Vector::z().cross(&part.out),
-                &mut time,
-                &mut openings,
-                rng,
-            );
+            self.clip(index, action, target);
             if hard {
-                take.blur_last_clip(rng);
+                self.take.blur_last_clip(self.rng);
             }
-            let last = take.frames.last().map(|f| f.world_from_camera);
+            let last = self.take.frames.last().map(|f| f.world_from_camera);
             for _ in 0..2 {
-                time += 0.4;
+                self.time += 0.4;
                 if let Some(pose) = last {
-                    take.still(time, pose, &openings);
+                    self.take.still(self.time, pose, &self.openings);
                 }
             }
         }
-        if n == 0 {
-            take.clips.push(TrueClip::distraction(take.frames.len() - 1));
-        }
     }
-    take
+
+    /// Where the person stands to move a part: eyes, world, metres.
+    fn stand(&mut self, part: &OpenPart, along: &Vector) -> Point {
+        let phi = part.articulation;
+        // Stand on the handle's far side of a hinge, out of the door's way; straight before a drawer.
+        let aside = match phi.kind {
+            JointKind::Revolute if phi.axis.z.abs() > 0.5 => {
+                let to_handle = crate::math::reject(&(part.handle - phi.origin), &phi.axis);
+                along * (0.25 * to_handle.dot(along).signum())
+            }
+            _ => along * self.rng.random_range(-0.25..0.25),
+        };
+        let distance = if phi.kind == JointKind::Prismatic || phi.axis.z.abs() < 0.5 { 0.85 } else { 0.65 };
+        let mut eye = part.handle + part.out * (distance + self.rng.random_range(0.0..0.15)) + aside;
+        eye.z = self.plan.eye_height;
+        eye
+    }
+
+    /// A part opened by `opened`, rad or m, or closed from there.
+    fn clip(&mut self, index: usize, action: Action, opened: f64) {
+        let kitchen = self.kitchen;
+        let part = &kitchen.parts[index];
+        let phi = part.articulation;
+        let along = Vector::z().cross(&part.out);
+        let eye = self.stand(part, &along);
+        let shoulder = shoulder_of(&eye, &along);
+        let mut slip = || self.rng.random_range(-0.01..0.01);
+        let slack = Vector::new(slip(), slip(), slip());
+        let seconds = self.rng.random_range(1.3..2.0);
+        let moving = (seconds * FPS) as usize;
+        let first = self.take.frames.len();
+        let (start, end) = match action {
+            Action::Open => (0.0, opened),
+            Action::Close => (opened, 0.0),
+        };
+        let rest = rest_of(&shoulder, &part.out);
+        let total = REACH + moving + LEAVE;
+        for i in 0..total {
+            let progress = smooth_step((i as f64 - REACH as f64) / moving as f64);
+            let opening = start + (end - start) * progress;
+            self.openings[index] = opening;
+            let held = phi.motion(opening) * (part.handle + slack);
+            let grasp = grasp_in(i, moving, &rest, &held);
+            let contact = (REACH..REACH + moving).contains(&i);
+            // The person follows the handle with the eyes and gives way to what comes out.
+            let back = match phi.kind {
+                JointKind::Prismatic => opening,
+                JointKind::Revolute => 0.15 * opening,
+            };
+            let eye_now = eye + part.out * back + sway(self.time);
+            let gaze = held + (part.bounds.center - held) * 0.3;
+            let camera = look_at(&eye_now, &gaze);
+            let frame = TrueFrame::with_hand(self.time, camera, &self.openings, grasp, &shoulder, contact);
+            self.take.frames.push(frame);
+            self.time += 1.0 / FPS;
+        }
+        self.take.clips.push(TakeClip::of_part(part, action, first, total));
+    }
 }
 
 impl Take {
@@ -242,97 +393,13 @@ impl Take {
             clip.noun = "it".to_owned();
         }
     }
-
-    #[allow(clippy::too_many_arguments, reason = "one call, all of it state of the take")]
-    fn clip(
-        &mut self,
-        part: &OpenPart,
-        index: usize,
-        action: Action,
-        opened: f64,
-        eye_height: f64,
-        along: &Vector,
-        time: &mut f64,
-        openings: &mut [f64],
-        rng: &mut Pcg64Mcg,
-    ) {
-        let phi = part.articulation;
-        // Stand on the handle's far side of a hinge, out of the door's way; straight before a drawer.
-        let aside = match phi.kind {
-            JointKind::Revolute if phi.axis.z.abs() > 0.5 => {
-                let to_handle = crate::math::reject(&(part.handle - phi.origin), &phi.axis);
-                along * (0.25 * to_handle.dot(along).signum())
-            }
-            _ => along * rng.random_range(-0.25..0.25),
-        };
-        let distance = if phi.kind == JointKind::Prismatic || phi.axis.z.abs() < 0.5 { 0.85 } else { 0.65 };
-        let stand = part.handle + part.out * (distance + rng.random_range(0.0..0.15)) + aside;
-        let mut eye = stand;
-        eye.z = eye_height;
-        let shoulder = eye - Vector::z() * 0.28 + along * 0.15;
-        let slack =
-            Vector::new(rng.random_range(-0.01..0.01), rng.random_range(-0.01..0.01), rng.random_range(-0.01..0.01));
-
-        let seconds = rng.random_range(1.3..2.0);
-        let (reach, moving, leave) = (REACH, (seconds * FPS) as usize, LEAVE);
-        let first = self.frames.len();
-        let (start, end) = match action {
-            Action::Open => (0.0, opened),
-            Action::Close => (opened, 0.0),
-        };
-        let rest = shoulder + part.out * -0.15 - Vector::z() * 0.25;
-        let total = reach + moving + leave;
-        for i in 0..total {
-            let progress = smooth_step((i as f64 - reach as f64) / moving as f64);
-            let opening = start + (end - start) * progress;
-            openings[index] = opening;
-            let held = phi.motion(opening) * (part.handle + slack);
-            let grasp = if i < reach {
-                rest + (held - rest) * smooth_step((i + 1) as f64 / reach as f64)
-            } else if i >= reach + moving {
-                held + (rest - held) * smooth_step((i + 1 - reach - moving) as f64 / leave as f64)
-            } else {
-                held
-            };
-            let contact = (reach..reach + moving).contains(&i);
-            // The person follows the handle with the eyes and gives way to what comes out.
-            let back = match phi.kind {
-                JointKind::Prismatic => opening,
-                JointKind::Revolute => 0.15 * opening,
-            };
-            let sway = Vector::new(0.01 * (1.7 * *time).sin(), 0.01 * (1.3 * *time).cos(), 0.005 * (2.1 * *time).sin());
-            let eye_now = eye + part.out * back + sway;
-            let gaze = held + (part.bounds.center - held) * 0.3;
-            let wrist = grasp + crate::math::unit(&(shoulder - grasp)).unwrap_or_else(Vector::z) * 0.16;
-            self.frames.push(TrueFrame {
-                time_secs: *time,
-                world_from_camera: look_at(&eye_now, &gaze),
-                openings: openings.to_vec(),
-                hand: vec![limb(&grasp, &wrist, 0.035), limb(&wrist, &shoulder, 0.04)],
-                grasp: Some((grasp, wrist)),
-                contact,
-                is_still: false,
-            });
-            *time += 1.0 / FPS;
-        }
-        let verb = if action == Action::Open { "open" } else { "close" };
-        self.clips.push(TrueClip {
-            span: [first + reach / 2, first + total - 1 - leave / 2],
-            true_span: [first, first + total - 1],
-            part: Some(part.id.clone()),
-            action: Some(action),
-            narration: format!("{verb} the {}", part.noun),
-            verb: verb.to_owned(),
-            noun: part.noun.to_owned(),
-        });
-    }
 }
 
 /// 21 joints in MANO/OpenPose order: wrist, then thumb to little finger, each from the palm to its tip. The mean of the
 /// thumb, index and middle tips is `grasp`.
 #[must_use]
 pub fn hand_joints(grasp: &Point, wrist: &Point) -> [Point; 21] {
-    let along = crate::math::unit(&(grasp - wrist)).unwrap_or_else(Vector::x);
+    let along = unit(&(grasp - wrist)).unwrap_or_else(Vector::x);
     let across = crate::math::any_orthogonal(&along);
     // Fingers side by side; the three that grasp are centred on the grasp.
     let offsets = [-0.02, 0.0, 0.02, 0.038, 0.055];

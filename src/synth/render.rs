@@ -3,15 +3,17 @@
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
+use nalgebra::Matrix3;
 
-use super::kitchen::Block;
+use super::kitchen::ColoredBox;
+use super::materials::{Coat, SurfacePlace};
 use crate::error::{Error, Result};
 use crate::math::{Pose, Vector};
 use crate::recording::Camera;
 
 /// One rendered frame, row-major.
 #[derive(Debug, Clone)]
-pub struct Picture {
+pub struct Rendering {
     /// Colour.
     pub rgb: Vec<[u8; 3]>,
     /// Depth along the optical axis, metres; 0 = nothing hit.
@@ -22,28 +24,71 @@ pub struct Picture {
     pub classes: Vec<u8>,
 }
 
+/// Where a ceiling lamp behind the person's shoulder is, world: a unit vector.
+#[must_use]
+pub fn lamp() -> Vector {
+    Vector::new(0.25, 0.35, 0.9).normalize()
+}
+
 /// Casts a ray through every pixel.
 #[must_use]
-pub fn cast(blocks: &[Block], world_from_camera: &Pose, camera: &Camera) -> Picture {
+pub fn cast(blocks: &[ColoredBox], world_from_camera: &Pose, camera: &Camera) -> Rendering {
+    cast_under(&lamp(), blocks, world_from_camera, camera)
+}
+
+/// The same under a lamp in a direction of the world, a unit vector.
+#[must_use]
+pub fn cast_under(light: &Vector, blocks: &[ColoredBox], world_from_camera: &Pose, camera: &Camera) -> Rendering {
+    trace(light, blocks, world_from_camera, camera).0
+}
+
+/// The same where boxes have materials: one each, from the first box on; further boxes stay flat. Depth, normals and classes are
+/// those of flat boxes.
+#[must_use]
+pub(super) fn cast_coated(
+    light: &Vector,
+    blocks: &[ColoredBox],
+    coats: &[Coat],
+    world_from_camera: &Pose,
+    camera: &Camera,
+) -> Rendering {
+    let (mut picture, seen) = trace(light, blocks, world_from_camera, camera);
+    let camera_from_world = world_from_camera.inverse();
+    let coated: Vec<(&Coat, (Matrix3<f64>, Vector))> =
+        coats.iter().zip(blocks.iter().map(|block| in_camera(block, &camera_from_world))).collect();
+    for (i, (coat, (rotation, center))) in
+        seen.iter().enumerate().filter_map(|(i, block)| Some((i, coated.get(*block)?)))
+    {
+        let ray = ray(i % camera.width, i / camera.width, camera);
+        let z = f64::from(picture.depth[i]);
+        let normal = Vector::from(picture.normals[i].map(f64::from));
+        let cosine = -normal.dot(&ray) / ray.norm();
+        let place = SurfacePlace::new(rotation * ray * z - center, (rotation * normal).iamax(), cosine, z / camera.fx);
+        if let Some(color) = coat.color_at(&place) {
+            let shade = shade(&(world_from_camera.rotation * normal), light);
+            picture.rgb[i] = color.map(|c| (c * shade).clamp(0.0, 255.0) as u8);
+        }
+    }
+    picture
+}
+
+/// The picture, and the number of the box that each pixel shows; `usize::MAX` for none.
+fn trace(light: &Vector, blocks: &[ColoredBox], world_from_camera: &Pose, camera: &Camera) -> (Rendering, Vec<usize>) {
     let count = camera.width * camera.height;
-    let mut picture = Picture {
+    let mut picture = Rendering {
         rgb: vec![[225, 228, 232]; count],
         depth: vec![0.0; count],
         normals: vec![[0.0; 3]; count],
         classes: vec![0; count],
     };
+    let mut seen = vec![usize::MAX; count];
     let camera_from_world = world_from_camera.inverse();
-    // A ceiling lamp behind the person's shoulder, in the world.
-    let light = Vector::new(0.25, 0.35, 0.9).normalize();
-    for block in blocks {
-        // The box in the camera frame: rays start at the origin with z = 1, so their parameter is the depth.
-        let rotation = (camera_from_world.rotation.to_rotation_matrix().matrix() * block.shape.rotation).transpose();
-        let center = rotation * (camera_from_world * block.shape.center).coords;
+    for (number, block) in blocks.iter().enumerate() {
+        let (rotation, center) = in_camera(block, &camera_from_world);
         let (x_range, y_range) = pixel_bounds(block, &camera_from_world, camera);
         for y in y_range {
             for x in x_range.clone() {
-                let ray = Vector::new((x as f64 - camera.cx) / camera.fx, (y as f64 - camera.cy) / camera.fy, 1.0);
-                let direction = rotation * ray;
+                let direction = rotation * ray(x, y, camera);
                 let Some((z, axis)) = hit(&center, &direction, &block.shape.half) else { continue };
                 let i = y * camera.width + x;
                 if picture.depth[i] > 0.0 && z as f32 >= picture.depth[i] {
@@ -53,8 +98,8 @@ pub fn cast(blocks: &[Block], world_from_camera: &Pose, camera: &Camera) -> Pict
                 let mut local = Vector::zeros();
                 local[axis] = sign;
                 let normal = rotation.transpose() * local;
-                let world_normal = world_from_camera.rotation * normal;
-                let shade = 0.55 + 0.45 * world_normal.dot(&light).max(0.0) - 0.12 * (-world_normal.z).max(0.0);
+                let shade = shade(&(world_from_camera.rotation * normal), light);
+                seen[i] = number;
                 picture.depth[i] = z as f32;
                 picture.normals[i] = [normal.x as f32, normal.y as f32, normal.z as f32];
                 picture.classes[i] = block.class;
@@ -62,7 +107,25 @@ pub fn cast(blocks: &[Block], world_from_camera: &Pose, camera: &Camera) -> Pict
             }
         }
     }
-    picture
+    (picture, seen)
+}
+
+/// A box in the camera frame: from the camera's axes to its own, and its middle in the latter. Rays start at the origin with z = 1,
+/// so their parameter is the depth.
+fn in_camera(block: &ColoredBox, camera_from_world: &Pose) -> (Matrix3<f64>, Vector) {
+    let rotation = (camera_from_world.rotation.to_rotation_matrix().matrix() * block.shape.rotation).transpose();
+    let center = rotation * (camera_from_world * block.shape.center).coords;
+    (rotation, center)
+}
+
+/// The ray of a pixel in the camera frame, z = 1.
+fn ray(x: usize, y: usize, camera: &Camera) -> Vector {
+    Vector::new((x as f64 - camera.cx) / camera.fx, (y as f64 - camera.cy) / camera.fy, 1.0)
+}
+
+/// How bright a side with a normal is under a lamp; both in the world, unit vectors.
+fn shade(normal: &Vector, light: &Vector) -> f64 {
+    0.55 + 0.45 * normal.dot(light).max(0.0) - 0.12 * (-normal.z).max(0.0)
 }
 
 /// Gaussian blur of a row-major image; nothing happens for a standard deviation of 0 pixels.
@@ -121,7 +184,7 @@ const NEAR_M: f64 = 0.02;
 
 /// Pixels that a box may cover.
 fn pixel_bounds(
-    block: &Block,
+    block: &ColoredBox,
     camera_from_world: &Pose,
     camera: &Camera,
 ) -> (std::ops::Range<usize>, std::ops::Range<usize>) {
@@ -155,7 +218,12 @@ fn pixel_bounds(
 ///
 /// # Errors
 /// Where an image cannot be encoded, which would be a bug.
-pub fn encode(picture: &Picture, camera: &Camera, frame: usize, with_normals: bool) -> Result<Vec<(String, Vec<u8>)>> {
+pub fn encode(
+    picture: &Rendering,
+    camera: &Camera,
+    frame: usize,
+    with_normals: bool,
+) -> Result<Vec<(String, Vec<u8>)>> {
     let (w, h) = (camera.width as u32, camera.height as u32);
     let fail = |e: image::ImageError| Error::Export(format!("frame {frame}: {e}"));
     let mut files = Vec::new();
@@ -207,7 +275,7 @@ mod tests {
     #[test]
     fn a_wall_two_metres_ahead_is_two_metres_deep_everywhere() {
         let camera = Camera { width: 32, height: 24, fx: 20.0, fy: 20.0, cx: 15.5, cy: 11.5 };
-        let wall = Block {
+        let wall = ColoredBox {
             shape: OrientedBox {
                 center: Point::new(0.0, 0.0, 2.5),
                 half: Vector::new(9.0, 9.0, 0.5),

@@ -3,12 +3,14 @@
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 
-use super::kitchen::{Kitchen, OpenPart, limb};
+use super::kitchen::{Kitchen, OpenPart};
 use super::noise::{chance, normal};
-use super::person::{FPS, LEAVE, REACH, Take, TrueClip, TrueFrame, look_at, smooth_step};
-use super::tiers::Sizes;
+use super::person::{
+    FPS, LEAVE, REACH, Take, TakeClip, TrueFrame, grasp_in, look_at, rest_of, shoulder_of, smooth_step, sway,
+};
+use super::tiers::TierSizes;
 use crate::articulation::{Action, JointKind};
-use crate::math::{Point, Vector, unit};
+use crate::math::{Point, Vector};
 
 /// Height of the eyes over the floor, metres.
 const EYE_M: [f64; 2] = [1.45, 1.75];
@@ -61,16 +63,15 @@ fn shuffle<T>(list: &mut [T], rng: &mut Pcg64Mcg) {
     }
 }
 
-/// Plays a take in which `count` parts (at most as many as the kitchen has) get `clips` clips each. The same draws play
-/// the same take on every tier, as far as its sizes allow.
+/// Plays a take in which each of the `chosen` parts gets `clips` clips. The same draws play the same take on every tier, as far
+/// as its sizes allow.
 #[must_use]
-pub fn play(kitchen: &Kitchen, count: usize, clips: usize, sizes: &Sizes, rng: &mut Pcg64Mcg) -> Take {
-    let chosen = choose(kitchen, count.min(kitchen.parts.len()), rng);
+pub fn play(kitchen: &Kitchen, chosen: &[usize], clips: usize, sizes: &TierSizes, rng: &mut Pcg64Mcg) -> Take {
     let floor = kitchen.parts.iter().map(|p| p.base.center.z - p.base.half.z).fold(f64::INFINITY, f64::min);
     let eye_height = floor + between(EYE_M, rng.random());
     let openings = vec![0.0; kitchen.parts.len()];
     let mut session = Session { kitchen, sizes, take: Take::default(), openings, time: 0.0, eye_height, rng };
-    session.look_around(&chosen);
+    session.look_around(chosen);
     let visits: Vec<Vec<Vec<Action>>> = chosen.iter().map(|_| session.visits(clips)).collect();
     let rounds = visits.iter().map(Vec::len).max().unwrap_or(0);
     let mut last = None;
@@ -92,8 +93,10 @@ pub fn play(kitchen: &Kitchen, count: usize, clips: usize, sizes: &Sizes, rng: &
     session.take
 }
 
-/// Parts dealt from decks of kinds: the frequent kinds more often, no part twice.
-fn choose(kitchen: &Kitchen, count: usize, rng: &mut Pcg64Mcg) -> Vec<usize> {
+/// `count` parts (at most as many as the kitchen has) dealt from decks of kinds: the frequent kinds more often, no part twice.
+#[must_use]
+pub fn choose(kitchen: &Kitchen, count: usize, rng: &mut Pcg64Mcg) -> Vec<usize> {
+    let count = count.min(kitchen.parts.len());
     let mut kinds: Vec<&str> = Vec::new();
     for part in &kitchen.parts {
         if !kinds.contains(&part.kind) {
@@ -118,7 +121,7 @@ fn choose(kitchen: &Kitchen, count: usize, rng: &mut Pcg64Mcg) -> Vec<usize> {
 /// A take under way.
 struct Session<'a> {
     kitchen: &'a Kitchen,
-    sizes: &'a Sizes,
+    sizes: &'a TierSizes,
     take: Take,
     openings: Vec<f64>,
     time: f64,
@@ -215,16 +218,12 @@ impl Session<'_> {
 
     /// A narration that moves no joint.
     fn distraction(&mut self) {
-        self.take.clips.push(TrueClip::distraction(self.take.frames.len().saturating_sub(1)));
+        self.take.clips.push(TakeClip::distraction(self.take.frames.len().saturating_sub(1)));
     }
 
-    fn clip(&mut self, index: usize, action: Action, path: [f64; 2]) {
-        let kitchen = self.kitchen;
-        let part = &kitchen.parts[index];
-        let phi = part.articulation;
-        let along = Vector::z().cross(&part.out);
+    /// All that is drawn for a clip comes first, whatever it is used for: the tiers play the same takes.
+    fn draws(&mut self, part: &OpenPart, action: Action) -> Draws {
         let across = part.out.cross(&part.handle_along);
-        // All draws first, whatever they are used for: the tiers play the same takes.
         let distance = between(STAND_M, self.draw());
         let sideways = between([-0.25, 0.25], self.draw());
         let slack = Vector::new(self.draw(), self.draw(), self.draw()).map(|d| between([-GRIP_M, GRIP_M], d));
@@ -236,76 +235,116 @@ impl Session<'_> {
         let leaves = chance(self.rng, EYES_LEAVE);
         let (leave_at, leave_side) = (between([0.5, 0.8], self.draw()), self.draw());
         let leave_at = if leaves && action == Action::Close { leave_at } else { f64::INFINITY };
-        let mut slide = normal(self.rng);
+        let slide = normal(self.rng);
+        Draws { distance, sideways, slack, drift, seconds, reversal, leave_at, leave_side, slide }
+    }
 
+    /// How a part is moved along a path of its opening; where the person stands to do so.
+    fn motion<'p>(&self, part: &'p OpenPart, path: [f64; 2], draws: Draws) -> ClipMotion<'p> {
+        let phi = part.articulation;
+        let along = Vector::z().cross(&part.out);
         // Stand on the handle's far side of an upright hinge, out of the door's way; anywhere before the rest.
         let aside = if phi.kind == JointKind::Revolute && phi.axis.z.abs() > 0.5 {
             0.25 * (part.handle - phi.origin).dot(&along).signum()
         } else {
-            sideways
+            draws.sideways
         };
-        let stand = self.place(part, distance, aside, self.eye_height);
-        let away = if leave_side < 0.5 { -1.2 } else { 1.2 };
-        let elsewhere = part.handle + along * away + Vector::z() * (0.6 * leave_side - 0.3);
+        let stand = self.place(part, draws.distance, aside, self.eye_height);
+        let away = if draws.leave_side < 0.5 { -1.2 } else { 1.2 };
+        let elsewhere = part.handle + along * away + Vector::z() * (0.6 * draws.leave_side - 0.3);
+        let moving = (draws.seconds * FPS) as usize;
+        ClipMotion { part, path, draws, along, stand, elsewhere, moving }
+    }
 
-        let moving = (seconds * FPS) as usize;
-        let total = REACH + moving + LEAVE;
+    fn clip(&mut self, index: usize, action: Action, path: [f64; 2]) {
+        let kitchen = self.kitchen;
+        let part = &kitchen.parts[index];
+        let draws = self.draws(part, action);
+        let mut slide = draws.slide;
+        let motion = self.motion(part, path, draws);
+        let total = REACH + motion.moving + LEAVE;
         let first = self.take.frames.len();
-        let widest = path[0].max(path[1]).max(f64::EPSILON);
         let keep_slide = (-1.0 / (FPS * SLIDE_SECS)).exp();
-        let follow = 1.0 - (-1.0 / (FPS * GAZE_SECS)).exp();
-        let shoulder_of = |eye: &Point| eye - Vector::z() * 0.28 + along * 0.15;
-        let rest_of = |shoulder: &Point| shoulder + part.out * -0.15 - Vector::z() * 0.25;
-        let mut gaze = phi.motion(path[0]) * part.handle;
+        let mut gaze = part.articulation.motion(path[0]) * part.handle;
         for i in 0..total {
-            let share = (i as f64 - REACH as f64) / moving as f64;
-            let opening = path[0] + (path[1] - path[0]) * progress(share, reversal);
-            self.openings[index] = opening;
+            self.openings[index] = motion.opening(i);
             slide = slide * keep_slide + normal(self.rng) * (1.0 - keep_slide * keep_slide).sqrt();
-            let offset = slack
-                + drift * (opening / widest)
-                + part.handle_along * (slide * self.sizes.grip_slide_m).clamp(-0.06, 0.06);
-            let motion = phi.motion(opening);
-            let held = motion * (part.handle + offset);
-            // Step back from what comes out, and along with what slides sideways.
-            let moved = motion * part.handle - part.handle;
-            let sideways = if phi.kind == JointKind::Prismatic { 0.5 * moved.dot(&along) } else { 0.0 };
-            let t = self.time;
-            let sway = Vector::new(0.01 * (1.7 * t).sin(), 0.01 * (1.3 * t).cos(), 0.005 * (2.1 * t).sin());
-            let eye = stand + part.out * moved.dot(&part.out).max(0.0) + along * sideways + sway;
-            let shoulder = shoulder_of(&eye);
-            let rest = rest_of(&shoulder);
-            let grasp = if i < REACH {
-                rest + (held - rest) * smooth_step((i + 1) as f64 / REACH as f64)
-            } else if i >= REACH + moving {
-                held + (rest - held) * smooth_step((i + 1 - REACH - moving) as f64 / LEAVE as f64)
-            } else {
-                held
-            };
-            let aim = if share >= leave_at { elsewhere } else { held + (part.bounds.center - held) * 0.3 };
-            gaze += (aim - gaze) * follow;
-            let wrist = grasp + unit(&(shoulder - grasp)).unwrap_or_else(Vector::z) * 0.16;
-            self.take.frames.push(TrueFrame {
-                time_secs: t,
-                world_from_camera: look_at(&eye, &gaze),
-                openings: self.openings.clone(),
-                hand: vec![limb(&grasp, &wrist, 0.035), limb(&wrist, &shoulder, 0.04)],
-                grasp: Some((grasp, wrist)),
-                contact: (REACH..REACH + moving).contains(&i),
-                is_still: false,
-            });
+            let slide_m = slide * self.sizes.grip_slide_m;
+            let frame = motion.frame(i, self.time, &self.openings, slide_m, &mut gaze);
+            self.take.frames.push(frame);
             self.time += 1.0 / FPS;
         }
-        let verb = if action == Action::Open { "open" } else { "close" };
-        self.take.clips.push(TrueClip {
-            span: [first + REACH / 2, first + total - 1 - LEAVE / 2],
-            true_span: [first, first + total - 1],
-            part: Some(part.id.clone()),
-            action: Some(action),
-            narration: format!("{verb} the {}", part.noun),
-            verb: verb.to_owned(),
-            noun: part.noun.to_owned(),
-        });
+        self.take.clips.push(TakeClip::of_part(part, action, first, total));
+    }
+}
+
+/// What is drawn for a clip.
+struct Draws {
+    /// Of the eyes before the closed handle and beside it, metres.
+    distance: f64,
+    sideways: f64,
+    /// Where on the handle it is held, metres.
+    slack: Vector,
+    /// How far the grip drifts on the way, metres.
+    drift: Vector,
+    /// Of the motion.
+    seconds: f64,
+    /// The shares of the way at which the motion turns back and goes on.
+    reversal: Option<[f64; 2]>,
+    /// After which share of the motion the eyes leave it, and to which side.
+    leave_at: f64,
+    leave_side: f64,
+    /// Where the grip begins to slide, in standard deviations.
+    slide: f64,
+}
+
+/// A part on its way, and the person before it.
+struct ClipMotion<'a> {
+    part: &'a OpenPart,
+    /// Opening at both ends, rad or m.
+    path: [f64; 2],
+    draws: Draws,
+    /// To the side, as the person sees it.
+    along: Vector,
+    /// Where the eyes are while the part is closed.
+    stand: Point,
+    /// Where the eyes look when they have left the part.
+    elsewhere: Point,
+    /// Frames in which the part moves.
+    moving: usize,
+}
+
+impl ClipMotion<'_> {
+    /// The share of the motion's time that has passed in frame `i` of the clip; beyond 0 to 1 the part stands.
+    fn share(&self, i: usize) -> f64 {
+        (i as f64 - REACH as f64) / self.moving as f64
+    }
+
+    /// The part's opening in frame `i`, rad or m.
+    fn opening(&self, i: usize) -> f64 {
+        self.path[0] + (self.path[1] - self.path[0]) * progress(self.share(i), self.draws.reversal)
+    }
+
+    /// Frame `i` of the clip at a time (s); `slide_m` is how far the grip slid along the handle, `gaze` follows the hand.
+    fn frame(&self, i: usize, time: f64, openings: &[f64], slide_m: f64, gaze: &mut Point) -> TrueFrame {
+        let (part, along) = (self.part, self.along);
+        let opening = self.opening(i);
+        let widest = self.path[0].max(self.path[1]).max(f64::EPSILON);
+        let offset =
+            self.draws.slack + self.draws.drift * (opening / widest) + part.handle_along * slide_m.clamp(-0.06, 0.06);
+        let motion = part.articulation.motion(opening);
+        let held = motion * (part.handle + offset);
+        // Step back from what comes out, and along with what slides sideways.
+        let moved = motion * part.handle - part.handle;
+        let sideways = if part.articulation.kind == JointKind::Prismatic { 0.5 * moved.dot(&along) } else { 0.0 };
+        let eye = self.stand + part.out * moved.dot(&part.out).max(0.0) + along * sideways + sway(time);
+        let shoulder = shoulder_of(&eye, &along);
+        let grasp = grasp_in(i, self.moving, &rest_of(&shoulder, &part.out), &held);
+        let leaves = self.share(i) >= self.draws.leave_at;
+        let aim = if leaves { self.elsewhere } else { held + (part.bounds.center - held) * 0.3 };
+        *gaze += (aim - *gaze) * (1.0 - (-1.0 / (FPS * GAZE_SECS)).exp());
+        let contact = (REACH..REACH + self.moving).contains(&i);
+        TrueFrame::with_hand(time, look_at(&eye, gaze), openings, grasp, &shoulder, contact)
     }
 }
 

@@ -9,7 +9,7 @@ use crate::math::Vector;
 use crate::twin::{Furniture, Joint, OrientedBox, Part, Role, Solid, Twin};
 
 /// The kitchen, closed: its parts with damping and friction of the table, what does not move as the room.
-pub(super) fn twin(kitchen: &Kitchen, name: String, up: &Vector, config: &config::Fitting) -> Twin {
+pub(super) fn twin(kitchen: &Kitchen, name: String, up: &Vector, priors: &config::Priors) -> Twin {
     let room = kitchen.fixed.iter().enumerate().map(|(i, block)| Solid {
         name: format!("fixed_{i:03}"),
         role: Role::Room,
@@ -18,14 +18,14 @@ pub(super) fn twin(kitchen: &Kitchen, name: String, up: &Vector, config: &config
     });
     Twin {
         name,
-        density_kg_per_m3: config.density_kg_per_m3,
-        furniture: kitchen.parts.iter().map(|part| furniture(part, up, config)).collect(),
+        density_kg_per_m3: priors.boards.density_kg_per_m3,
+        furniture: kitchen.parts.iter().map(|part| furniture(part, up, priors)).collect(),
         room: room.filter(|solid| solid.check().is_ok()).collect(),
         left_out: Vec::new(),
     }
 }
 
-fn furniture(part: &OpenPart, up: &Vector, config: &config::Fitting) -> Furniture {
+fn furniture(part: &OpenPart, up: &Vector, priors: &config::Priors) -> Furniture {
     let id = &part.id;
     let solids = part.blocks.iter().enumerate().map(|(i, block)| {
         let (word, role) = match block.color {
@@ -38,8 +38,8 @@ fn furniture(part: &OpenPart, up: &Vector, config: &config::Fitting) -> Furnitur
     let phi = part.articulation;
     let slide = phi.kind == JointKind::Prismatic;
     let (damping, friction) = match phi.kind {
-        JointKind::Prismatic => (config.slide_damping, config.slide_friction),
-        JointKind::Revolute => (config.hinge_damping, config.hinge_friction),
+        JointKind::Prismatic => (priors.resistance.slide_damping, priors.resistance.slide_friction),
+        JointKind::Revolute => (priors.resistance.hinge_damping, priors.resistance.hinge_friction),
     };
     Furniture {
         name: format!("{id}_base"),
@@ -87,13 +87,13 @@ fn faced(bounds: &OrientedBox) -> OrientedBox {
 
 #[cfg(test)]
 mod tests {
-    use crate::synth::{Options, Recorded, Tier};
+    use crate::synth::{Recorded, SynthOptions, Tier};
     use crate::twin::Role;
 
     #[test]
     fn a_true_kitchen_can_be_built_and_has_its_handles_where_they_are_held() {
         for (seed, tier) in [(1, Tier::Realistic), (2, Tier::T2), (3, Tier::Nonm)] {
-            let recorded = Recorded::new(&Options { seed, tier, width: 64, parts: 3 }).unwrap();
+            let recorded = Recorded::new(&SynthOptions { seed, tier, width: 64, parts: 3 }).unwrap();
             let twin = recorded.twin();
             assert_eq!(twin.furniture.len(), recorded.kitchen().parts.len());
             assert!(twin.room.len() > 5);

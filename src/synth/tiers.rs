@@ -3,11 +3,11 @@
 //! None of them is measured on a real recording: all are assumed, each for the reason that its field names, so that the
 //! tiers run from nearly exact to harder than current estimators on head-worn video.
 
-use super::{Changes, Tier};
+use super::variants::{Changes, Tier};
 
 /// All in which the benchmark's tiers differ.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sizes {
+pub struct TierSizes {
     /// Standard deviation of a fingertip's slowly varying error across the viewing ray, metres a direction. Assumed: a
     /// hand's place in the image is good to a few pixels.
     pub hand_lateral_m: f64,
@@ -85,7 +85,7 @@ const fn deg(degrees: f64) -> f64 {
     degrees * (std::f64::consts::PI / 180.0)
 }
 
-const T0: Sizes = Sizes {
+const T0: TierSizes = TierSizes {
     hand_lateral_m: 0.001,
     hand_ray_m: 0.001,
     hand_white_m: 0.001,
@@ -120,7 +120,7 @@ const T0: Sizes = Sizes {
     turned_rad: None,
 };
 
-const T1: Sizes = Sizes {
+const T1: TierSizes = TierSizes {
     hand_lateral_m: 0.008,
     hand_ray_m: 0.015,
     hand_white_m: 0.003,
@@ -146,7 +146,7 @@ const T1: Sizes = Sizes {
     ..T0
 };
 
-const T2: Sizes = Sizes {
+const T2: TierSizes = TierSizes {
     hand_lateral_m: 0.015,
     hand_ray_m: 0.03,
     hand_white_m: 0.005,
@@ -175,7 +175,7 @@ const T2: Sizes = Sizes {
     ..T1
 };
 
-const HD: Sizes = Sizes {
+const HD: TierSizes = TierSizes {
     hand_lateral_m: 0.02,
     hand_ray_m: 0.04,
     hand_white_m: 0.006,
@@ -206,7 +206,7 @@ const HD: Sizes = Sizes {
     ..T2
 };
 
-const T3: Sizes = Sizes {
+const T3: TierSizes = TierSizes {
     hand_lateral_m: 0.025,
     hand_ray_m: 0.05,
     hand_white_m: 0.008,
@@ -235,13 +235,13 @@ const T3: Sizes = Sizes {
     ..T2
 };
 
-const SHORT: Sizes = Sizes { door_rad: [deg(10.0), deg(22.0)], drawer_m: [0.05, 0.09], short_share: 0.0, ..T2 };
+const SHORT: TierSizes = TierSizes { door_rad: [deg(10.0), deg(22.0)], drawer_m: [0.05, 0.09], short_share: 0.0, ..T2 };
 
-const NONM: Sizes = Sizes { turned_rad: Some([deg(12.0), deg(33.0)]), ..T2 };
+const NONM: TierSizes = TierSizes { turned_rad: Some([deg(12.0), deg(33.0)]), ..T2 };
 
 /// The sizes of a tier of the benchmark with what a study changes; `None` for the tiers of the other kitchens.
 #[must_use]
-pub fn sizes(tier: Tier, changes: &Changes) -> Option<Sizes> {
+pub fn sizes(tier: Tier, changes: &Changes) -> Option<TierSizes> {
     let mut s = match tier {
         Tier::Clean | Tier::Realistic | Tier::Hard => return None,
         Tier::T0 => T0,

@@ -81,9 +81,6 @@ impl Replay {
     }
 }
 
-/// At rest between the two ways, and after them.
-const REST_SECS: f64 = 0.25;
-
 /// Pulls `part` along `drive` under `joint` (which may be a rival of the part's own) with the limits 0..`upper`.
 ///
 /// The hand is a spring and a damper of `hand_stiffness_n_per_m`, critical on the mass of the part, and no stronger than
@@ -100,12 +97,10 @@ pub fn simulate(
     drive: &Drive,
     config: &config::Validation,
 ) -> Result<Replay> {
-    // A person opens a part within seconds; ten minutes are another unit.
-    const MAX_SECS: f64 = 600.0;
     let (Some(&first), Some(&end)) = (drive.path.first(), drive.times_secs.last()) else {
         return Err(Error::Simulation(format!("{}: an empty path", part.id)));
     };
-    if !(0.0..=MAX_SECS).contains(&end) {
+    if !(0.0..=config.longest_secs).contains(&end) {
         return Err(Error::Simulation(format!(
             "{}: the recorded hand takes {end:.3e} s; time stamps must be seconds and must not go back",
             part.id
@@ -115,18 +110,19 @@ pub fn simulate(
     let start = joint.opening_at(&drive.grip, &first).clamp(0.0, upper);
     let properties = mass_properties(&part.solids, around.density);
     let mass = properties.map_or(0.0, |m| m.mass);
-    let damping = 2.0 * (config.hand_stiffness_n_per_m * mass.max(0.1)).sqrt();
-    let held = properties.map_or(0.0, |p| held_inertia(joint, &drive.grip, &p, damping * dt));
+    let damping = 2.0 * (config.hand_stiffness_n_per_m * mass.max(config.least_mass_kg)).sqrt();
+    let held = properties.map_or(0.0, |p| held_inertia(joint, &drive.grip, &p, damping * dt / config.taken_share));
     let mut world = World::new(part, joint, upper, start, held, around, dt)?;
     let start = world.start;
 
     let target = |t: f64| -> Point {
-        let t = if t <= end { t } else { (2.0 * end + REST_SECS - t).clamp(0.0, end) };
+        let t = if t <= end { t } else { (2.0 * end + config.rest_secs - t).clamp(0.0, end) };
         at(&drive.times_secs, &drive.path, t)
     };
     let forward = ((end / dt).ceil() as usize).max(1);
-    let steps = if drive.back { (((2.0 * end + 2.0 * REST_SECS) / dt).ceil() as usize).max(forward) } else { forward };
-    let every = ((1.0 / 30.0 / dt).round() as usize).max(1);
+    let steps =
+        if drive.back { (((2.0 * end + 2.0 * config.rest_secs) / dt).ceil() as usize).max(forward) } else { forward };
+    let every = ((1.0 / config.trace_hz / dt).round() as usize).max(1);
 
     // Weight does its work at the centre of mass.
     let center = properties.map(|m| m.center).filter(|_| !part.joint.balanced);
@@ -199,10 +195,8 @@ pub fn simulate(
         out.kinetic_max_j = out.kinetic_max_j.max(world.kinetic_energy());
         out.work_max_j = out.work_max_j.max(hand_work + weight_work);
         out.drift_m = out.drift_m.max(drift(&world, joint));
-        // Within a thousandth of a radian or a millimetre of a stop the part stands at it.
-        const AT_STOP: f64 = 1e-3;
-        out.limit_steps[0] += usize::from(opening < AT_STOP && turning < 0.0);
-        out.limit_steps[1] += usize::from(opening > upper - AT_STOP && turning > 0.0);
+        out.limit_steps[0] += usize::from(opening < config.at_stop && turning < 0.0);
+        out.limit_steps[1] += usize::from(opening > upper - config.at_stop && turning > 0.0);
         if step % every == 0 {
             out.trace.push([t, opening, strength, distance]);
             out.hand.push(target(t + dt));
@@ -225,10 +219,9 @@ pub fn simulate(
 }
 
 /// The inertia (kg m^2 about a hinge, kg along a slide) that a joint lacks for a hand that is felt once a step: fingers that
-/// hold a part of grams move with it, and a damper that takes more than three quarters of a velocity in one step makes the
-/// part fly. `impulse_per_speed` is the hand's damping times the step, kg.
-fn held_inertia(joint: &Articulation, grip: &Point, part: &MassProperties, impulse_per_speed: f64) -> f64 {
-    const TAKEN: f64 = 0.75;
+/// hold a part of grams move with it, and a damper that takes most of a velocity in one step makes the part fly. `least_kg`, at
+/// the grip: the hand's damping times the step, over the share of a velocity that it may take.
+fn held_inertia(joint: &Articulation, grip: &Point, part: &MassProperties, least_kg: f64) -> f64 {
     let own = match joint.kind {
         JointKind::Prismatic => part.mass,
         JointKind::Revolute => {
@@ -236,7 +229,7 @@ fn held_inertia(joint: &Articulation, grip: &Point, part: &MassProperties, impul
             joint.axis.dot(&(part.inertia * joint.axis)) + part.mass * arm.norm_squared()
         }
     };
-    (impulse_per_speed / TAKEN * joint.lever(grip).powi(2) - own).max(0.0)
+    (least_kg * joint.lever(grip).powi(2) - own).max(0.0)
 }
 
 /// Why a simulation's result cannot be: limits and joints hold in it as far as a motion counts as explained, no hand that
@@ -248,11 +241,6 @@ fn beyond_reason(
     fastest: f64,
     config: &config::Validation,
 ) -> Option<String> {
-    // A ball thrown hard is this fast, m/s.
-    const THROWN: f64 = 20.0;
-    // What a neighbour that falls onto the part may add, J; and what the steps' size makes of the work.
-    const SPARE_J: f64 = 1.0;
-    const SPARE: f64 = 2.0;
     let [least, most] = replay.reached;
     let beyond = (most - upper).max(-least).max(0.0);
     if beyond * joint.lever(&replay.grip) > config.pass_rms_m {
@@ -261,10 +249,10 @@ fn beyond_reason(
     if replay.drift_m > config.pass_rms_m {
         return Some(format!("the part left its joint by {:.0} cm", 100.0 * replay.drift_m));
     }
-    if fastest > THROWN {
+    if fastest > config.thrown_m_per_s {
         return Some(format!("the handle moved at {fastest:.0} m/s"));
     }
-    let most_j = SPARE * replay.work_max_j.max(0.0) + SPARE_J;
+    let most_j = config.spare_work * replay.work_max_j.max(0.0) + config.spare_j;
     (replay.kinetic_max_j > most_j).then(|| {
         format!(
             "the part moved with {:.1} J after {:.1} J of work had been done on it",

@@ -9,7 +9,7 @@ use crate::articulation::{Articulation, JointKind};
 use crate::config;
 use crate::hands::Trajectory;
 use crate::inference::openings;
-use crate::math::{Point, Vector, path, reject, unit, unsigned_angle};
+use crate::math::{Point, Vector, path, reject, stats, unit, unsigned_angle};
 use crate::twin::{Part, Role};
 
 /// One clip's hand as evidence.
@@ -50,6 +50,42 @@ impl Evidence {
             noise_m: smoothed_away.max(path::beside_any_joint(&path)),
             path,
         })
+    }
+
+    /// Why a joint that does not follow this hand is not refuted by it, in words: it was recorded at so few places that its way
+    /// between them is not known, or it is faster than a hand that holds something. `None` where neither is so.
+    #[must_use]
+    pub fn doubt(&self, config: &config::Validation) -> Option<String> {
+        if self.path.len() < config.least_samples {
+            return Some(format!(
+                "the hand was recorded at {} places only: its way between them is not known",
+                self.path.len()
+            ));
+        }
+        let speed = self.speed(config);
+        (speed > config.hand_speed_max_m_per_s).then(|| {
+            format!("the hand goes at {speed:.1} m/s, which no hand that holds something does: its times are off")
+        })
+    }
+
+    /// The speed that a tenth of the motion exceeds, m/s, each over a time in which noise adds little to it; the mean one of a
+    /// shorter motion.
+    fn speed(&self, config: &config::Validation) -> f64 {
+        let samples: Vec<(f64, &Point)> = self.times_secs.iter().copied().zip(&self.path).collect();
+        let between = |a: &(f64, &Point), b: &(f64, &Point)| match ((b.1 - a.1).norm(), b.0 - a.0) {
+            (0.0, _) => 0.0,
+            (way, time) => way / time,
+        };
+        let speeds: Vec<f64> = samples
+            .iter()
+            .enumerate()
+            .filter_map(|(i, a)| {
+                let b = samples.iter().skip(i + 1).find(|b| b.0 - a.0 >= config.speed_window_secs)?;
+                Some(between(a, b))
+            })
+            .collect();
+        let whole = samples.first().zip(samples.last()).map_or(0.0, |(a, b)| between(a, b));
+        stats::quantile(&speeds, 1.0 - config.speed_share).unwrap_or(whole)
     }
 }
 
@@ -161,12 +197,12 @@ pub fn rivals(part: &Part, grip: &Point, config: &config::Validation) -> Vec<Riv
     ] {
         for (name, sign) in names.into_iter().zip([-1.0, 1.0]) {
             let origin = bounds.center + depth + across * (half * sign);
-            let hinge = outward(Articulation { kind: JointKind::Revolute, axis, origin }, grip, &out);
+            let hinge = opening_towards(Articulation { kind: JointKind::Revolute, axis, origin }, grip, &out);
             let near = own.kind == JointKind::Revolute
-                && unsigned_angle(&axis, &own.axis) < 0.3
-                && own.line().distance(&origin) < 0.5 * half.max(0.1);
+                && unsigned_angle(&axis, &own.axis) < config.same_way_rad
+                && own.line().distance(&origin) < 0.5 * half.max(config.least_half_m);
             // A hinge through the hand explains nothing and would not be built.
-            if !near && hinge.line().distance(grip) > 0.05 {
+            if !near && hinge.line().distance(grip) > config.least_lever_m {
                 all.push(rival(name, hinge));
             }
         }
@@ -178,7 +214,7 @@ pub fn rivals(part: &Part, grip: &Point, config: &config::Validation) -> Vec<Riv
         ("slide upwards", up),
         ("slide downwards", -up),
     ] {
-        if own.kind == JointKind::Revolute || unsigned_angle(&axis, &own.axis) > 0.3 {
+        if own.kind == JointKind::Revolute || unsigned_angle(&axis, &own.axis) > config.same_way_rad {
             all.push(rival(name, Articulation { kind: JointKind::Prismatic, axis, origin: *grip }));
         }
     }
@@ -189,7 +225,7 @@ pub fn rivals(part: &Part, grip: &Point, config: &config::Validation) -> Vec<Riv
             [("nearer to the hand", arm), ("farther from the hand", -arm), ("in front", opening), ("behind", -opening)]
         {
             let moved = Articulation { origin: own.origin + direction * config.rival_shift_m, ..own };
-            all.push(rival(&format!("hinge {by:.0} cm {place}"), outward(moved, grip, &opening)));
+            all.push(rival(&format!("hinge {by:.0} cm {place}"), opening_towards(moved, grip, &opening)));
         }
     }
     all
@@ -200,7 +236,7 @@ fn rival(name: &str, articulation: Articulation) -> Rival {
 }
 
 /// The sense of a hinge in which the grip goes out.
-fn outward(hinge: Articulation, grip: &Point, out: &Vector) -> Articulation {
+fn opening_towards(hinge: Articulation, grip: &Point, out: &Vector) -> Articulation {
     if hinge.axis.cross(&(grip - hinge.origin)).dot(out) >= 0.0 { hinge } else { hinge.reversed() }
 }
 
@@ -214,9 +250,6 @@ pub struct Resolution {
     pub tilt_rad: Option<f64>,
 }
 
-/// An error that makes the hands less likely by this is seen: the nats of two standard deviations.
-const SEEN_NATS: f64 = 2.0;
-
 /// Moves a joint in every direction until its recordings speak against it. In steps of 1 cm and 1 degree.
 #[must_use]
 pub fn resolution(joint: &Articulation, clips: &[Evidence], config: &config::Validation) -> Resolution {
@@ -226,7 +259,7 @@ pub fn resolution(joint: &Articulation, clips: &[Evidence], config: &config::Val
         unit(&reject(&(grip - joint.origin), &joint.axis)).unwrap_or_else(|| crate::math::any_orthogonal(&joint.axis));
     let across = joint.axis.cross(&arm);
     let start = log_likelihood(joint, clips, config);
-    let seen = |moved: &Articulation| start - log_likelihood(moved, clips, config) >= SEEN_NATS;
+    let seen = |moved: &Articulation| start - log_likelihood(moved, clips, config) >= config.seen_nats;
     // What the worst direction needs.
     let least = |steps: u32, moved: &dyn Fn(&Vector, f64) -> Articulation| -> Option<u32> {
         [arm, -arm, across, -across]
@@ -302,6 +335,26 @@ mod tests {
         assert!(shift < 0.12 && tilt < 0.35, "{wide:?}");
         assert!(narrow.shift_m.is_none_or(|s| s > 2.0 * shift), "{narrow:?}");
         assert!(narrow.tilt_rad.is_none_or(|t| t > 1.5 * tilt), "{narrow:?}");
+    }
+
+    #[test]
+    fn a_hand_of_few_places_or_faster_than_any_is_doubted() {
+        let config = config::Validation::default();
+        let clip = evidence(&HINGE, 1.2);
+        assert_eq!(clip.doubt(&config), None);
+        let kept = |n: usize| Evidence {
+            times_secs: clip.times_secs.iter().step_by(30 / n).copied().collect(),
+            path: clip.path.iter().step_by(30 / n).copied().collect(),
+            ..clip.clone()
+        };
+        assert!(kept(3).doubt(&config).is_some_and(|d| d.contains("at 4 places only")));
+        assert_eq!(kept(5).doubt(&config), None);
+        let fast = Evidence { times_secs: clip.times_secs.iter().map(|t| 0.02 * t).collect(), ..clip.clone() };
+        assert!(fast.doubt(&config).is_some_and(|d| d.contains("its times are off")));
+        // A single jump is no speed of the hand.
+        let mut jumps = clip;
+        jumps.path[15] += Vector::new(0.0, 0.0, 1.0);
+        assert_eq!(jumps.doubt(&config), None);
     }
 
     #[test]

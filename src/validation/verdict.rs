@@ -175,20 +175,7 @@ fn check_joint(
         .iter()
         .filter_map(|(name, t)| Evidence::of(t, config).map(|clip| ((name.as_str(), t.action), clip)))
         .unzip();
-    let closed: Vec<Point> = clips.iter().map(|c| c.closed).collect();
-    let mut compared = Vec::new();
-    if let Some(grip) = centroid(&closed) {
-        let likely = log_likelihood(&own, &clips, config);
-        for Rival { name, articulation } in rivals(part, &grip, config) {
-            compared.push(RivalCheck {
-                name,
-                articulation,
-                distance_m: pooled_distance(&articulation, &clips),
-                margin_nats: likely - log_likelihood(&articulation, &clips, config),
-            });
-        }
-    }
-    compared.sort_by(|a, b| a.margin_nats.total_cmp(&b.margin_nats));
+    let compared = compared(part, &clips, config);
     let replayed = named
         .iter()
         .zip(&clips)
@@ -200,7 +187,7 @@ fn check_joint(
                 Some(best) => Some(replay_rival(part, best, clip, around, config)?),
                 None => None,
             };
-            Ok(ClipCheck {
+            let mut check = ClipCheck {
                 clip: name.to_owned(),
                 action,
                 observed_range: observed_range(&own, &grip, &clip.path),
@@ -210,11 +197,48 @@ fn check_joint(
                 samples: clip.samples,
                 replay: simulate(part, &own, part.joint.upper, around, &drive, config)?,
                 rival,
-            })
+            };
+            if check.replay.untrusted.is_none() && is_left_behind(part, &check, config) {
+                check.replay.untrusted = clip.doubt(config);
+            }
+            Ok(check)
         })
         .collect::<Result<Vec<ClipCheck>>>()?;
     let resolves = (!clips.is_empty()).then(|| resolution(&own, &clips, config));
     Ok(judge(part, replayed, compared, resolves, config))
+}
+
+/// The rivals of a part's joint over all clips, best first; none without clips.
+fn compared(part: &Part, clips: &[Evidence], config: &config::Validation) -> Vec<RivalCheck> {
+    let own = part.joint.articulation;
+    let closed: Vec<Point> = clips.iter().map(|c| c.closed).collect();
+    let Some(grip) = centroid(&closed) else { return Vec::new() };
+    let likely = log_likelihood(&own, clips, config);
+    let mut compared: Vec<RivalCheck> = rivals(part, &grip, config)
+        .into_iter()
+        .map(|Rival { name, articulation }| RivalCheck {
+            name,
+            articulation,
+            distance_m: pooled_distance(&articulation, clips),
+            margin_nats: likely - log_likelihood(&articulation, clips, config),
+        })
+        .collect();
+    compared.sort_by(|a, b| a.margin_nats.total_cmp(&b.margin_nats));
+    compared
+}
+
+/// The best of `rivals` where it is clearly better than the joint: by the margin that decides, and by the price of having had
+/// several to choose from; and where it explains the hands itself.
+fn ahead<'a>(rivals: &'a [RivalCheck], config: &config::Validation) -> Option<&'a RivalCheck> {
+    rivals.first().filter(|r| {
+        r.margin_nats <= -config.margin_nats - (rivals.len() as f64).ln() && r.distance_m <= 2.0 * config.pass_rms_m
+    })
+}
+
+/// The rival to which a part's joint clearly loses by the hands of all its clips, in closed form.
+pub(crate) fn beaten(part: &Part, hands: &[&Trajectory], config: &config::Validation) -> Option<RivalCheck> {
+    let clips: Vec<Evidence> = hands.iter().filter_map(|hand| Evidence::of(hand, config)).collect();
+    ahead(&compared(part, &clips, config), config).cloned()
 }
 
 /// A rival pulled by the same hand. It gets all the room it wants: what is compared is how well the motion fits.
@@ -226,8 +250,8 @@ fn replay_rival(
     config: &config::Validation,
 ) -> Result<RivalReplay> {
     let joint = rival.articulation;
-    // Half a turn; two metres of slide.
-    let upper = if joint.kind == JointKind::Revolute { std::f64::consts::PI } else { 2.0 };
+    // Half a turn, or more than any slide.
+    let upper = if joint.kind == JointKind::Revolute { std::f64::consts::PI } else { config.rival_slide_m };
     let drive = Drive {
         times_secs: clip.times_secs.clone(),
         path: clip.path.clone(),
@@ -270,13 +294,17 @@ fn held_out(joint: &Articulation, clips: &[Evidence], i: usize) -> Option<f64> {
 /// - *It cannot follow*: on more than half of the clips the tracking error is above twice `pass_rms_m` and above twice the
 ///   noise that is left when any hinge or slide may explain the hand. Where none does, the hand is to blame.
 ///
-/// The last two are asked only of simulations that can be trusted ([`Replay::untrusted`]).
+/// The last two are asked only of simulations that can be trusted ([`Replay::untrusted`]), and what a hand shows that was recorded
+/// at a few places only, or that is faster than any ([`Evidence::doubt`]), is asked only what the part ran into.
 ///
-/// **Undetermined**, else, where there is no hand, where the simulations of half of the clips blew up, where the tracking error
-/// is above `pass_rms_m`, or where the best rival is within `margin_nats`: a motion too small for its noise cannot tell them
-/// apart. As rivals stand `rival_shift_m` beside a hinge, what passes is at least known to that. And where the joint's own log
-/// odds, after hand, depth, words and physics, are below `margin_nats`: a hand alone follows some joints that depth speaks
-/// against.
+/// A part of which nothing was seen, as in recordings without depth, stands where the hand says that it could, among furniture of
+/// which the same is true: what it runs into refutes nothing, and what it does not run into proves nothing.
+///
+/// **Undetermined**, else, where there is no hand, where nothing of the part was seen, where the simulations of half of the
+/// clips blew up, where the tracking error is above `pass_rms_m`, or where the best rival is within `margin_nats`: a motion
+/// too small for its noise cannot tell them apart. As rivals stand `rival_shift_m` beside a hinge, what passes is at least
+/// known to that. And where the joint's own log odds, after hand, depth, words and physics, are below `margin_nats`: a hand
+/// alone follows some joints that depth speaks against.
 ///
 /// **Pass** else.
 fn judge(
@@ -294,9 +322,7 @@ fn judge(
     let range = clips.iter().map(|c| c.observed_range).fold(0.0, f64::max);
     let best = rivals.first();
     let mut faults: Vec<String> = Vec::new();
-    if let Some(rival) = best.filter(|r| {
-        r.margin_nats <= -config.margin_nats - (rivals.len() as f64).ln() && r.distance_m <= 2.0 * config.pass_rms_m
-    }) {
+    if let Some(rival) = ahead(&rivals, config) {
         faults.push(if rival.name == REVERSED {
             "the recorded hand opens it the other way".to_owned()
         } else {
@@ -310,8 +336,10 @@ fn judge(
         });
     }
     let blocked = trusted.iter().filter_map(|c| blocked(part, c, config)).max_by(|a, b| a.0.total_cmp(&b.0));
-    faults.extend(blocked.map(|(_, why)| why));
-    let off = trusted.iter().filter(|c| c.replay.rms_m > 2.0 * config.pass_rms_m.max(c.noise_m)).count();
+    let assumed = is_assumed(part);
+    let runs_into = blocked.as_ref().filter(|_| assumed).map(|(_, why)| why.clone());
+    faults.extend(blocked.filter(|_| !assumed).map(|(_, why)| why));
+    let off = trusted.iter().filter(|c| cannot_follow(c, config)).count();
     if 2 * off > trusted.len() {
         faults.push(format!("the handle stays {} (RMS) away from the recorded hand", centimetres(rms_m)));
     }
@@ -332,7 +360,7 @@ fn judge(
         };
         (Verdict::Undetermined, text)
     } else if let Some(rival) = best.filter(|r| r.margin_nats < config.margin_nats) {
-        let text = if clips.iter().map(way).fold(0.0, f64::max) < GLIMPSE_M {
+        let text = if clips.iter().map(way).fold(0.0, f64::max) < config.glimpse_m {
             "the hand was seen for a moment only: no motion to replay".to_owned()
         } else if rival.margin_nats >= 0.0 {
             format!("over {} a {} would look about the same", amount(kind, range), rival.name)
@@ -346,6 +374,16 @@ fn judge(
             centimetres(rms_m),
             100.0 * (1.0 - p)
         );
+        (Verdict::Undetermined, text)
+    } else if assumed {
+        let text = match runs_into {
+            Some(why) => format!("its front is assumed, and so is what stands around it: {why}"),
+            None => format!(
+                "follows the recorded hand to {} over {}, but its front is assumed: nothing was seen of it",
+                centimetres(rms_m),
+                amount(kind, range)
+            ),
+        };
         (Verdict::Undetermined, text)
     } else {
         let rivals = best.map_or(String::new(), |r| {
@@ -370,6 +408,11 @@ fn judge(
     }
 }
 
+/// Whether nothing of a part was seen.
+fn is_assumed(part: &Part) -> bool {
+    !part.solids.is_empty() && part.solids.iter().all(|solid| !solid.seen)
+}
+
 /// Why the first simulation that blew up is not to be trusted.
 fn blew_up(clips: &[ClipCheck]) -> Option<&str> {
     clips.iter().find_map(|c| c.replay.untrusted.as_deref())
@@ -384,9 +427,6 @@ pub fn log_odds(probability: f64) -> f64 {
     let p = probability.clamp(1e-12, 1.0 - 1e-12);
     (p / (1.0 - p)).ln()
 }
-
-/// A hand that went less far was seen for a moment, not in motion, metres.
-const GLIMPSE_M: f64 = 0.02;
 
 /// How far the hand went from where it was first seen, metres.
 fn way(clip: &ClipCheck) -> f64 {
@@ -424,6 +464,19 @@ pub(crate) fn lacking(
 /// the difference of two positions of the hand.
 pub(crate) fn made_up_m(noise_m: f64, config: &config::Validation) -> f64 {
     2.0 * config.grip_slack_m + 2.0 * std::f64::consts::SQRT_2 * noise_m.max(config.hand_std_m)
+}
+
+/// Whether a part stays behind the hand although nothing stands in its way: then a hand that went otherwise explains it, too.
+fn is_left_behind(part: &Part, clip: &ClipCheck, config: &config::Validation) -> bool {
+    let replay = &clip.replay;
+    let lacks = lacking(part, replay, clip.observed_range, clip.noise_m, config).is_some();
+    let is_stopped = lacks && (replay.limit_steps[1] > 0 || !replay.contacts.is_empty());
+    !is_stopped && (lacks || cannot_follow(clip, config))
+}
+
+/// Whether a part stays further from the hand than the hand's own noise makes it.
+fn cannot_follow(clip: &ClipCheck, config: &config::Validation) -> bool {
+    clip.replay.rms_m > 2.0 * config.pass_rms_m.max(clip.noise_m)
 }
 
 /// What keeps a part from going where the hand went: metres lacking at the handle, and why in words.
@@ -466,7 +519,7 @@ fn sees(kind: JointKind, resolution: &Resolution) -> String {
 
 /// How likely a rival is beside the joint: "1/20", "less than a millionth".
 fn one_in(nats: f64) -> String {
-    // Beyond this the hands' own model is in doubt, not the rival.
+    /// Format: beyond this the hands' own model is in doubt, not the rival.
     const MOST: f64 = 1e6;
     let odds = nats.exp();
     match odds {
@@ -493,81 +546,4 @@ fn centimetres(metres: f64) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use nalgebra::Matrix3;
-
-    use super::*;
-    use crate::twin::{Joint, OrientedBox, Role, Solid};
-
-    /// A drawer's front that slides to -y.
-    fn front() -> Part {
-        let bounds = OrientedBox {
-            center: Point::new(0.0, 0.0, 0.5),
-            half: Vector::new(0.2, 0.1, 0.01),
-            // Right, up, out of the face.
-            rotation: Matrix3::from_columns(&[Vector::x(), Vector::z(), -Vector::y()]),
-        };
-        let handle = Point::new(0.0, -0.03, 0.5);
-        let articulation = Articulation { kind: JointKind::Prismatic, axis: -Vector::y(), origin: handle };
-        let joint = Joint {
-            articulation,
-            upper: 0.4,
-            observed: 0.3,
-            expected: 0.4,
-            probability: None,
-            damping: 1.0,
-            friction: 1.0,
-            resistance_seen: false,
-            balanced: false,
-        };
-        let solid = Solid { name: "front".to_owned(), role: Role::Front, shape: bounds, seen: true };
-        Part { id: "drawer".to_owned(), label: "drawer".to_owned(), joint, solids: vec![solid], handle, bounds }
-    }
-
-    /// A hand's way of 0.3 m, replayed.
-    fn replayed(part: &Part, config: &config::Validation) -> ClipCheck {
-        let path: Vec<Point> =
-            (0..=60).map(|i| part.joint.articulation.motion(0.005 * f64::from(i)) * part.handle).collect();
-        let times_secs = (0..=60).map(|i| f64::from(i) / 30.0).collect();
-        let drive = Drive { times_secs, path, grip: part.handle, back: false };
-        let up = Vector::z();
-        let around = Surroundings::none(&up, 700.0);
-        ClipCheck {
-            clip: "clip".to_owned(),
-            action: Action::Open,
-            observed_range: 0.3,
-            distance_m: 0.0,
-            held_out_rms_m: None,
-            noise_m: 0.0,
-            samples: 8.0,
-            replay: simulate(part, &part.joint.articulation, part.joint.upper, &around, &drive, config).unwrap(),
-            rival: None,
-        }
-    }
-
-    #[test]
-    fn a_simulation_that_blew_up_refutes_nothing() {
-        let config = config::Validation::default();
-        let part = front();
-        let good = replayed(&part, &config);
-        assert_eq!(good.replay.untrusted, None);
-        let mut wild = good.clone();
-        wild.replay.rms_m = 0.3;
-        wild.replay.reached = [0.0, 0.01];
-        let told = |clips: &[&ClipCheck]| {
-            let clips = clips.iter().map(|c| (*c).clone()).collect();
-            judge(&part, clips, Vec::new(), None, &config)
-        };
-        assert_eq!(told(&[&wild]).verdict, Verdict::Fail);
-        wild.replay.untrusted = Some("the handle moved at 90 m/s".to_owned());
-        let check = told(&[&wild]);
-        assert_eq!(check.verdict, Verdict::Undetermined);
-        assert!(
-            check.reason.contains("not to be trusted here, because the handle moved at 90 m/s"),
-            "{}",
-            check.reason
-        );
-        // Beside good ones a bad one costs only itself.
-        assert_eq!(told(&[&good, &wild, &good]).verdict, Verdict::Pass);
-    }
-}
+mod tests;

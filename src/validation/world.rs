@@ -48,9 +48,9 @@ pub struct Contact {
     pub impulse_n_s: f64,
 }
 
-/// Solids nearer than this when closed touch there, metres: models from elsewhere set fronts right onto their carcass.
+/// Geometry: solids nearer than this when closed touch there, metres: models from elsewhere set fronts right onto their carcass.
 const TOUCH_M: f64 = 1e-3;
-/// Shared space that simulators' soft contacts forgive, metres: no obstacle. The moving part is this much smaller all around.
+/// Numerics: shared space that simulators' soft contacts forgive, metres: no obstacle. The moving part is this much smaller all around.
 const FORGIVEN_M: f64 = 1e-4;
 
 impl<'a> Surroundings<'a> {
@@ -96,8 +96,9 @@ struct Reach {
 impl Reach {
     /// Of `part`, along the axes of `frame`.
     fn of(part: &Part, frame: &Part) -> Self {
-        // Between two of the steps a hinge of a metre and half a turn passes a centimetre beyond both.
+        /// Geometry: between two of the steps a hinge of a metre and half a turn passes a centimetre beyond both.
         const STEPS: u32 = 12;
+        /// Geometry: that centimetre.
         const MARGIN_M: f64 = 0.01;
         let mut reach = Self {
             rotation: frame.bounds.rotation,
@@ -378,6 +379,7 @@ fn hang(
 /// The largest opening up to `start` at which the moving solids (the first `moving`) share space with nothing but what they
 /// touch when closed: a simulation that begins inside something flies apart.
 fn free_start(solids: &[&Solid], moving: usize, joint: &Articulation, start: f64, apart: &Apart) -> f64 {
+    /// Numerics: openings that are tried.
     const STEPS: u32 = 60;
     let free = |opening: f64| {
         let motion = joint.motion(opening);

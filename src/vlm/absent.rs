@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use super::{Model, Question, Usage};
+use super::{LanguageModel, PictureQuestion, Usage};
 use crate::error::Result;
 
 /// Counts what would be asked. Its answer says nothing but is one, so that the questions that follow from answers are
@@ -21,8 +21,8 @@ impl DryRun {
     }
 }
 
-impl Model for DryRun {
-    fn ask(&self, question: &Question) -> Result<Option<String>> {
+impl LanguageModel for DryRun {
+    fn ask(&self, question: &PictureQuestion) -> Result<Option<String>> {
         self.usage.lock().unwrap_or_else(PoisonError::into_inner).ask(question);
         Ok(Some("unknown".to_owned()))
     }
@@ -38,12 +38,12 @@ impl Model for DryRun {
 
 /// Never answers: what is not in the store ([`super::store::Stored`]) stays open. Needs no network.
 #[derive(Debug)]
-pub struct Replay {
+pub struct StoredOnly {
     model: String,
     usage: Mutex<Usage>,
 }
 
-impl Replay {
+impl StoredOnly {
     /// Stands in for the model of that name.
     #[must_use]
     pub fn new(model: &str) -> Self {
@@ -51,8 +51,8 @@ impl Replay {
     }
 }
 
-impl Model for Replay {
-    fn ask(&self, _question: &Question) -> Result<Option<String>> {
+impl LanguageModel for StoredOnly {
+    fn ask(&self, _question: &PictureQuestion) -> Result<Option<String>> {
         self.usage.lock().unwrap_or_else(PoisonError::into_inner).fail("not among the stored answers");
         Ok(None)
     }

@@ -1,9 +1,10 @@
 //! Who answers questions about pictures: an OpenAI-compatible server, stored answers, or nobody (§3.3, §A.6).
 //!
-//! Everything is reached through [`Model`]. An answer that cannot be had is `None`, counted with its reason in [`Usage`]:
+//! Everything is reached through [`LanguageModel`]. An answer that cannot be had is `None`, counted with its reason in [`Usage`]:
 //! the inference goes on without it.
 
 pub mod absent;
+#[cfg(feature = "vlm-http")]
 pub mod server;
 pub mod store;
 
@@ -14,7 +15,7 @@ use crate::error::Result;
 
 /// An encoded picture.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Picture {
+pub struct EncodedPicture {
     /// JPEG or PNG.
     pub bytes: Vec<u8>,
     /// `image/jpeg` or `image/png`.
@@ -36,23 +37,23 @@ pub struct Sampling {
 
 /// One question.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Question {
+pub struct PictureQuestion {
     /// What it is for: the clip's name, a slash, and a name for a file ("clip_000/motion_01_frame_000031").
     pub purpose: String,
     /// The prompt.
     pub text: String,
     /// What goes with it.
-    pub pictures: Vec<Picture>,
+    pub pictures: Vec<EncodedPicture>,
     /// How to answer.
     pub sampling: Sampling,
 }
 
-impl Question {
+impl PictureQuestion {
     /// Estimated tokens of prompt and pictures: one per four bytes of text; a picture as OpenAI counts it in high detail,
     /// 85 plus 170 for each tile of 512 pixels after fitting it into 2048 x 2048 and its shorter side into 768.
     #[must_use]
     pub fn tokens(&self) -> usize {
-        let picture = |p: &Picture| {
+        let picture = |p: &EncodedPicture| {
             let size = p.size.map(f64::from);
             let (long, short) = (size[0].max(size[1]).max(1.0), size[0].min(size[1]).max(1.0));
             let scale = (2048.0 / long).min(1.0);
@@ -65,12 +66,12 @@ impl Question {
 }
 
 /// Whoever answers.
-pub trait Model: Sync {
-    /// The answer as text; `None` where there is none that could be used, the reason counted in [`Model::usage`].
+pub trait LanguageModel: Sync {
+    /// The answer as text; `None` where there is none that could be used, the reason counted in [`LanguageModel::usage`].
     ///
     /// # Errors
     /// Only what must end the run: a refused key, an answer that cannot be stored.
-    fn ask(&self, question: &Question) -> Result<Option<String>>;
+    fn ask(&self, question: &PictureQuestion) -> Result<Option<String>>;
 
     /// The model's name.
     fn name(&self) -> &str;
@@ -79,8 +80,8 @@ pub trait Model: Sync {
     fn usage(&self) -> Usage;
 }
 
-impl<M: Model + ?Sized> Model for &M {
-    fn ask(&self, question: &Question) -> Result<Option<String>> {
+impl<M: LanguageModel + ?Sized> LanguageModel for &M {
+    fn ask(&self, question: &PictureQuestion) -> Result<Option<String>> {
         (**self).ask(question)
     }
 
@@ -110,13 +111,13 @@ pub struct Usage {
     pub failed: BTreeMap<String, usize>,
     /// Pictures that went with the questions asked.
     pub pictures: usize,
-    /// Estimated tokens of the questions asked ([`Question::tokens`]).
+    /// Estimated tokens of the questions asked ([`PictureQuestion::tokens`]).
     pub tokens: usize,
 }
 
 impl Usage {
     /// Counts a question as asked.
-    fn ask(&mut self, question: &Question) {
+    fn ask(&mut self, question: &PictureQuestion) {
         self.asked += 1;
         self.pictures += question.pictures.len();
         self.tokens += question.tokens();
@@ -165,9 +166,10 @@ mod tests {
     #[test]
     fn pictures_cost_what_openai_says() {
         let tokens = |size: [u32; 2]| {
-            let picture = Picture { bytes: Vec::new(), mime: "image/jpeg", size };
+            let picture = EncodedPicture { bytes: Vec::new(), mime: "image/jpeg", size };
             let sampling = Sampling { temperature: 0.5, top_p: 0.3, max_tokens: 9 };
-            Question { purpose: String::new(), text: "abcde".to_owned(), pictures: vec![picture], sampling }.tokens()
+            PictureQuestion { purpose: String::new(), text: "abcde".to_owned(), pictures: vec![picture], sampling }
+                .tokens()
         };
         // 1024 x 1024 shrinks to 768 x 768: four tiles. 2048 x 4096 to 768 x 1536: six. Text adds two.
         assert_eq!(tokens([1024, 1024]), 2 + 765);

@@ -12,7 +12,7 @@ use base64::Engine;
 use serde::{Deserialize, Serialize};
 use ureq::http::HeaderValue;
 
-use super::{Model, Question, Usage};
+use super::{LanguageModel, PictureQuestion, Usage};
 use crate::error::{Error, Result};
 
 /// Longer answers are refused: ours are a line or two.
@@ -22,13 +22,13 @@ const GIVE_UP_AFTER: usize = 5;
 
 /// A key from an environment variable. It has no `Display`, and its `Debug` names the variable only.
 #[derive(Clone)]
-pub struct Key {
+pub struct ApiKey {
     variable: String,
     secret: String,
     header: HeaderValue,
 }
 
-impl Key {
+impl ApiKey {
     /// The key in an environment variable; `None` where it is not set, or empty.
     ///
     /// # Errors
@@ -50,7 +50,7 @@ impl Key {
     }
 }
 
-impl fmt::Debug for Key {
+impl fmt::Debug for ApiKey {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "Key(from {})", self.variable)
     }
@@ -58,7 +58,7 @@ impl fmt::Debug for Key {
 
 /// How long, how often, how much.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Limits {
+pub struct RequestLimits {
     /// Until a connection stands.
     pub connect: Duration,
     /// For one request, until its answer is complete.
@@ -75,7 +75,7 @@ pub struct Limits {
     pub max_requests: usize,
 }
 
-impl Default for Limits {
+impl Default for RequestLimits {
     fn default() -> Self {
         Self {
             connect: Duration::from_secs(10),
@@ -94,8 +94,8 @@ pub struct Server {
     agent: ureq::Agent,
     endpoint: String,
     model: String,
-    key: Option<Key>,
-    limits: Limits,
+    key: Option<ApiKey>,
+    limits: RequestLimits,
     slots: Slots,
     sent: AtomicUsize,
     failed_in_a_row: AtomicUsize,
@@ -114,7 +114,7 @@ impl fmt::Debug for Server {
 }
 
 /// Why a request gave no answer.
-enum Fault {
+enum RequestFault {
     /// Nothing will ever work: the run ends.
     Fatal(String),
     /// May work later; after this pause, where the server says one.
@@ -128,7 +128,7 @@ impl Server {
     ///
     /// # Errors
     /// Where the address cannot be used.
-    pub fn new(url: &str, model: &str, key: Option<Key>, limits: Limits) -> Result<Self> {
+    pub fn new(url: &str, model: &str, key: Option<ApiKey>, limits: RequestLimits) -> Result<Self> {
         let endpoint = endpoint(url)?;
         let config = ureq::Agent::config_builder()
             .http_status_as_error(false)
@@ -166,15 +166,15 @@ impl Server {
         self.count().fail(reason);
     }
 
-    fn body(&self, question: &Question) -> Result<Vec<u8>> {
+    fn body(&self, question: &PictureQuestion) -> Result<Vec<u8>> {
         let encode = |bytes: &[u8]| base64::engine::general_purpose::STANDARD.encode(bytes);
-        let mut content = vec![Part::Text { text: &question.text }];
-        content.extend(question.pictures.iter().map(|p| Part::ImageUrl {
+        let mut content = vec![ContentPart::Text { text: &question.text }];
+        content.extend(question.pictures.iter().map(|p| ContentPart::ImageUrl {
             image_url: ImageUrl { url: format!("data:{};base64,{}", p.mime, encode(&p.bytes)) },
         }));
         let request = Request {
             model: &self.model,
-            messages: [Message { role: "user", content }],
+            messages: [ChatMessage { role: "user", content }],
             temperature: question.sampling.temperature,
             top_p: question.sampling.top_p,
             max_tokens: question.sampling.max_tokens,
@@ -183,7 +183,7 @@ impl Server {
     }
 
     /// One HTTP request.
-    fn send(&self, body: &[u8]) -> std::result::Result<String, Fault> {
+    fn send(&self, body: &[u8]) -> std::result::Result<String, RequestFault> {
         let mut request = self.agent.post(self.endpoint.as_str()).header("content-type", "application/json");
         if let Some(key) = &self.key {
             request = request.header("authorization", key.header.clone());
@@ -197,7 +197,7 @@ impl Server {
         let kind = header("content-type").unwrap_or_default();
         if status == 401 || status == 403 {
             // What the server says may quote the key.
-            return Err(Fault::Fatal(match &self.key {
+            return Err(RequestFault::Fatal(match &self.key {
                 Some(key) => format!(
                     "{} refuses the key (HTTP {status}); is the one in {} valid, and for this server?",
                     self.endpoint, key.variable
@@ -209,10 +209,10 @@ impl Server {
             }));
         }
         if status == 408 || status == 425 || status == 429 || status >= 500 {
-            return Err(Fault::Passing(format!("HTTP {status}"), pause));
+            return Err(RequestFault::Passing(format!("HTTP {status}"), pause));
         }
         if (300..400).contains(&status) {
-            return Err(Fault::Final(format!("HTTP {status}: a redirect; give the address that it leads to")));
+            return Err(RequestFault::Final(format!("HTTP {status}: a redirect; give the address that it leads to")));
         }
         let bytes =
             response.body_mut().with_config().limit(MAX_ANSWER_BYTES).read_to_vec().map_err(|e| self.transport(&e))?;
@@ -220,19 +220,19 @@ impl Server {
         if (200..300).contains(&status) {
             self.answer(&text, &kind)
         } else {
-            Err(Fault::Final(format!("HTTP {status}{}", self.quoted(&complaint(&text)))))
+            Err(RequestFault::Final(format!("HTTP {status}{}", self.quoted(&complaint(&text)))))
         }
     }
 
     /// The answer in a reply. Some servers send it as text/plain: what it is counts, not what it is called.
-    fn answer(&self, text: &str, kind: &str) -> std::result::Result<String, Fault> {
+    fn answer(&self, text: &str, kind: &str) -> std::result::Result<String, RequestFault> {
         let Ok(reply) = serde_json::from_str::<Reply>(text) else {
             let kind = kind.split(';').next().unwrap_or_default().trim();
             let hint = if kind == "text/html" { " (a web page: is the address right?)" } else { "" };
-            return Err(Fault::Final(format!("a reply that is no JSON of a chat completion{hint}")));
+            return Err(RequestFault::Final(format!("a reply that is no JSON of a chat completion{hint}")));
         };
         let Some(choice) = reply.choices.into_iter().next() else {
-            return Err(Fault::Final(format!("a reply without an answer{}", self.quoted(&complaint(text)))));
+            return Err(RequestFault::Final(format!("a reply without an answer{}", self.quoted(&complaint(text)))));
         };
         let content = match choice.message.content {
             Some(Content::Text(text)) => text,
@@ -243,22 +243,22 @@ impl Server {
         if content.is_empty() {
             let cut = choice.finish_reason.as_deref() == Some("length");
             let hint = if cut { " (cut off before it began: raise reasoning.vlm_max_tokens)" } else { "" };
-            return Err(Fault::Final(format!("an empty answer{hint}")));
+            return Err(RequestFault::Final(format!("an empty answer{hint}")));
         }
         Ok(self.redacted(content))
     }
 
-    fn transport(&self, error: &ureq::Error) -> Fault {
+    fn transport(&self, error: &ureq::Error) -> RequestFault {
         match error {
             ureq::Error::Timeout(_) => {
-                Fault::Passing(format!("no answer within {} s", self.limits.request.as_secs_f64()), None)
+                RequestFault::Passing(format!("no answer within {} s", self.limits.request.as_secs_f64()), None)
             }
-            ureq::Error::Io(e) => Fault::Passing(format!("connection: {}", e.kind()), None),
-            ureq::Error::HostNotFound => Fault::Passing("no such host".to_owned(), None),
-            ureq::Error::ConnectionFailed => Fault::Passing("no connection".to_owned(), None),
-            ureq::Error::Protocol(_) => Fault::Passing("a reply that is no HTTP".to_owned(), None),
-            ureq::Error::BodyExceedsLimit(_) => Fault::Final("an answer above 1 MiB".to_owned()),
-            other => Fault::Final(self.redacted(&other.to_string())),
+            ureq::Error::Io(e) => RequestFault::Passing(format!("connection: {}", e.kind()), None),
+            ureq::Error::HostNotFound => RequestFault::Passing("no such host".to_owned(), None),
+            ureq::Error::ConnectionFailed => RequestFault::Passing("no connection".to_owned(), None),
+            ureq::Error::Protocol(_) => RequestFault::Passing("a reply that is no HTTP".to_owned(), None),
+            ureq::Error::BodyExceedsLimit(_) => RequestFault::Final("an answer above 1 MiB".to_owned()),
+            other => RequestFault::Final(self.redacted(&other.to_string())),
         }
     }
 
@@ -279,8 +279,8 @@ impl Server {
     }
 }
 
-impl Model for Server {
-    fn ask(&self, question: &Question) -> Result<Option<String>> {
+impl LanguageModel for Server {
+    fn ask(&self, question: &PictureQuestion) -> Result<Option<String>> {
         if self.failed_in_a_row.load(Ordering::Relaxed) >= GIVE_UP_AFTER {
             self.count().fail("the server failed several times in a row and was not asked again");
             return Ok(None);
@@ -315,12 +315,12 @@ impl Model for Server {
                 }
             };
             match fault {
-                Fault::Fatal(message) => return Err(Error::Vlm(message)),
-                Fault::Final(reason) => {
+                RequestFault::Fatal(message) => return Err(Error::Vlm(message)),
+                RequestFault::Final(reason) => {
                     self.failed(&reason);
                     return Ok(None);
                 }
-                Fault::Passing(reason, wanted) => {
+                RequestFault::Passing(reason, wanted) => {
                     let wait = wanted.unwrap_or(pause).max(pause);
                     if attempt == self.limits.tries.max(1) || spent.saturating_add(wait) > self.limits.patience {
                         self.failed(&reason);
@@ -351,20 +351,20 @@ struct Slots {
 }
 
 /// A place among them, given back when dropped.
-struct Slot<'a>(&'a Slots);
+struct RequestSlot<'a>(&'a Slots);
 
 impl Slots {
-    fn take(&self) -> Slot<'_> {
+    fn take(&self) -> RequestSlot<'_> {
         let mut free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
         while *free == 0 {
             free = self.freed.wait(free).unwrap_or_else(PoisonError::into_inner);
         }
         *free -= 1;
-        Slot(self)
+        RequestSlot(self)
     }
 }
 
-impl Drop for Slot<'_> {
+impl Drop for RequestSlot<'_> {
     fn drop(&mut self) {
         *self.0.free.lock().unwrap_or_else(PoisonError::into_inner) += 1;
         self.0.freed.notify_one();
@@ -434,21 +434,21 @@ fn complaint(text: &str) -> String {
 #[derive(Serialize)]
 struct Request<'a> {
     model: &'a str,
-    messages: [Message<'a>; 1],
+    messages: [ChatMessage<'a>; 1],
     temperature: f64,
     top_p: f64,
     max_tokens: usize,
 }
 
 #[derive(Serialize)]
-struct Message<'a> {
+struct ChatMessage<'a> {
     role: &'static str,
-    content: Vec<Part<'a>>,
+    content: Vec<ContentPart<'a>>,
 }
 
 #[derive(Serialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
-enum Part<'a> {
+enum ContentPart<'a> {
     Text { text: &'a str },
     ImageUrl { image_url: ImageUrl },
 }
@@ -461,11 +461,11 @@ struct ImageUrl {
 #[derive(Deserialize)]
 struct Reply {
     #[serde(default)]
-    choices: Vec<Choice>,
+    choices: Vec<AnswerChoice>,
 }
 
 #[derive(Deserialize)]
-struct Choice {
+struct AnswerChoice {
     message: Said,
     #[serde(default)]
     finish_reason: Option<String>,
@@ -493,7 +493,7 @@ struct SaidPart {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vlm::{Picture, Sampling};
+    use crate::vlm::{EncodedPicture, Sampling};
 
     #[test]
     fn an_address_works_with_and_without_its_version() {
@@ -528,19 +528,19 @@ mod tests {
 
     #[test]
     fn a_key_shows_nowhere() {
-        let key = Key::new("MY_KEY", "sk-abcdefgh12345").unwrap();
-        let server = Server::new("http://localhost:1", "m", Some(key.clone()), Limits::default()).unwrap();
+        let key = ApiKey::new("MY_KEY", "sk-abcdefgh12345").unwrap();
+        let server = Server::new("http://localhost:1", "m", Some(key.clone()), RequestLimits::default()).unwrap();
         let shown = format!("{key:?} {server:?} {}", server.quoted("wrong key\nsk-abcdefgh12345"));
         assert!(shown.contains("MY_KEY") && shown.contains("***") && !shown.contains("abcdefgh"), "{shown}");
-        assert!(Key::new("MY_KEY", "a\nb").unwrap_err().to_string().contains("MY_KEY"));
+        assert!(ApiKey::new("MY_KEY", "a\nb").unwrap_err().to_string().contains("MY_KEY"));
     }
 
     #[test]
     fn replies_are_read_in_every_usual_form() {
-        let server = Server::new("http://localhost:1", "m", None, Limits::default()).unwrap();
+        let server = Server::new("http://localhost:1", "m", None, RequestLimits::default()).unwrap();
         let check = |text: &str| match server.answer(text, "text/html; charset=utf-8") {
             Ok(answer) => answer,
-            Err(Fault::Final(reason)) => format!("final: {reason}"),
+            Err(RequestFault::Final(reason)) => format!("final: {reason}"),
             Err(_) => "another fault".to_owned(),
         };
         assert_eq!(check(r#"{"choices":[{"message":{"role":"assistant","content":" drawer "}}]}"#), "drawer");
@@ -559,11 +559,11 @@ mod tests {
 
     #[test]
     fn a_question_goes_out_as_text_and_data_urls() {
-        let server = Server::new("http://localhost:1", "m", None, Limits::default()).unwrap();
-        let question = Question {
+        let server = Server::new("http://localhost:1", "m", None, RequestLimits::default()).unwrap();
+        let question = PictureQuestion {
             purpose: "c/q".to_owned(),
             text: "which?".to_owned(),
-            pictures: vec![Picture { bytes: vec![1, 2, 3], mime: "image/jpeg", size: [1, 1] }],
+            pictures: vec![EncodedPicture { bytes: vec![1, 2, 3], mime: "image/jpeg", size: [1, 1] }],
             sampling: Sampling { temperature: 0.5, top_p: 0.3, max_tokens: 300 },
         };
         let body: serde_json::Value = serde_json::from_slice(&server.body(&question).unwrap()).unwrap();

@@ -9,7 +9,7 @@ use std::sync::{Mutex, PoisonError};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::{Model, Question, Usage};
+use super::{LanguageModel, PictureQuestion, Usage};
 use crate::error::{Error, Result};
 use crate::json;
 
@@ -39,7 +39,7 @@ pub struct Stored<M> {
     damaged: Mutex<BTreeSet<String>>,
 }
 
-impl<M: Model> Stored<M> {
+impl<M: LanguageModel> Stored<M> {
     /// Answers from `dir` where it can, asks `inner` where it cannot, and keeps what `inner` says.
     ///
     /// # Errors
@@ -68,12 +68,12 @@ impl<M: Model> Stored<M> {
         }
     }
 
-    fn path(&self, question: &Question) -> PathBuf {
+    fn path(&self, question: &PictureQuestion) -> PathBuf {
         self.dir.join(format!("{}.json", key(self.inner.name(), question)))
     }
 
     /// Through a file beside its place: a reader never sees half an answer.
-    fn keep(&self, question: &Question, answer: &str) -> Result<()> {
+    fn keep(&self, question: &PictureQuestion, answer: &str) -> Result<()> {
         let record = Record {
             model: self.inner.name().to_owned(),
             purpose: question.purpose.clone(),
@@ -95,8 +95,8 @@ impl<M: Model> Stored<M> {
     }
 }
 
-impl<M: Model> Model for Stored<M> {
-    fn ask(&self, question: &Question) -> Result<Option<String>> {
+impl<M: LanguageModel> LanguageModel for Stored<M> {
+    fn ask(&self, question: &PictureQuestion) -> Result<Option<String>> {
         let path = self.path(question);
         if path.is_file() {
             // A damaged one is not asked for again: somebody may have mended it by hand, all but a comma.
@@ -131,7 +131,7 @@ impl<M: Model> Model for Stored<M> {
 }
 
 /// Names an answer by everything that it depends on; where the model is served does not matter.
-fn key(model: &str, question: &Question) -> String {
+fn key(model: &str, question: &PictureQuestion) -> String {
     let mut hash = Sha256::new();
     // Lengths in front, so that no two questions run together to the same bytes.
     let mut add = |bytes: &[u8]| {
@@ -160,14 +160,14 @@ fn hex(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vlm::absent::{DryRun, Replay};
-    use crate::vlm::{Picture, Sampling};
+    use crate::vlm::absent::{DryRun, StoredOnly};
+    use crate::vlm::{EncodedPicture, Sampling};
 
-    fn question(text: &str, bytes: &[u8]) -> Question {
-        Question {
+    fn question(text: &str, bytes: &[u8]) -> PictureQuestion {
+        PictureQuestion {
             purpose: "clip/name".to_owned(),
             text: text.to_owned(),
-            pictures: vec![Picture { bytes: bytes.to_vec(), mime: "image/jpeg", size: [8, 8] }],
+            pictures: vec![EncodedPicture { bytes: bytes.to_vec(), mime: "image/jpeg", size: [8, 8] }],
             sampling: Sampling { temperature: 0.5, top_p: 0.3, max_tokens: 300 },
         }
     }
@@ -175,8 +175,8 @@ mod tests {
     #[test]
     fn the_name_of_an_answer_changes_with_everything_it_depends_on() {
         let base = question("a", &[1, 2]);
-        let hotter = Question { sampling: Sampling { temperature: 0.6, ..base.sampling }, ..base.clone() };
-        let elsewhere = Question { purpose: "other/name".to_owned(), ..base.clone() };
+        let hotter = PictureQuestion { sampling: Sampling { temperature: 0.6, ..base.sampling }, ..base.clone() };
+        let elsewhere = PictureQuestion { purpose: "other/name".to_owned(), ..base.clone() };
         let name = key("m", &base);
         assert_eq!(name.len(), 64);
         assert_eq!(name, key("m", &elsewhere));
@@ -197,7 +197,7 @@ mod tests {
         let usage = stored.usage();
         assert_eq!((usage.asked, usage.from_store), (1, 1));
 
-        let replay = Stored::reading(Replay::new("m"), dir.path());
+        let replay = Stored::reading(StoredOnly::new("m"), dir.path());
         assert_eq!(replay.ask(&q).unwrap().as_deref(), Some("unknown"));
         assert_eq!(replay.ask(&question("b", &[1])).unwrap(), None);
         assert_eq!((replay.usage().from_store, replay.usage().failures()), (1, 1));
@@ -208,7 +208,7 @@ mod tests {
     #[test]
     fn a_damaged_answer_costs_itself_and_is_named() {
         let dir = tempfile::tempdir().unwrap();
-        let stored = Stored::new(Replay::new("m"), dir.path()).unwrap();
+        let stored = Stored::new(StoredOnly::new("m"), dir.path()).unwrap();
         let q = question("a", &[1]);
         std::fs::write(stored.path(&q), "{").unwrap();
         assert_eq!(stored.ask(&q).unwrap(), None);

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use paws_twin::articulation::JointKind::{self, Prismatic, Revolute};
-use paws_twin::import::articulations::{self, Joint, Options, Scene};
+use paws_twin::import::articulations::{self, FoundJoint, JointOptions, JointScene};
 use paws_twin::math::{Point, Vector};
 use serde_json::{Value, json};
 
@@ -20,8 +20,8 @@ fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
     dir
 }
 
-fn read(path: &Path) -> Scene {
-    articulations::read(path, None, &Options::default()).unwrap()
+fn read(path: &Path) -> JointScene {
+    articulations::read(path, None, &JointOptions::default()).unwrap()
 }
 
 fn data(name: &str) -> PathBuf {
@@ -31,7 +31,7 @@ fn data(name: &str) -> PathBuf {
 /// A joint's type, axis, origin and range.
 type Expected = (JointKind, [f64; 3], [f64; 3], Option<[f64; 2]>);
 
-fn check(joint: &Joint, expected: Expected) {
+fn check(joint: &FoundJoint, expected: Expected) {
     let (kind, axis, origin, range) = expected;
     assert_eq!(joint.kind, kind, "{}", joint.id);
     assert!((joint.axis - Vector::from(axis)).norm() < 1e-9, "{}: {}", joint.id, joint.axis);
@@ -171,7 +171,7 @@ fn scenefun3ds_origins_are_points_of_the_laser_scan() {
     assert_eq!(scene.left_out[0].place, "motions[2]");
     assert!(scene.left_out[0].reason.contains("4 is beyond the 4 points"), "{}", scene.left_out[0].reason);
     std::fs::remove_file(dir.path().join("420673_laser_scan.ply")).unwrap();
-    let error = articulations::read(dir.path(), None, &Options::default()).unwrap_err().to_string();
+    let error = articulations::read(dir.path(), None, &JointOptions::default()).unwrap_err().to_string();
     assert!(error.contains("420673_laser_scan.ply") && error.contains("--points"), "{error}");
 }
 
@@ -252,10 +252,10 @@ fn broken_files_are_told_by_name_place_and_field() {
     ] {
         let path = dir.path().join("joints.json");
         std::fs::write(&path, text).unwrap();
-        let error = articulations::read(&path, None, &Options::default()).unwrap_err().to_string();
+        let error = articulations::read(&path, None, &JointOptions::default()).unwrap_err().to_string();
         assert!(error.contains(words) && error.contains("joints.json"), "\"{words}\" is not in: {error}");
     }
-    let error = articulations::read(&data("ok.json"), Some("opd"), &Options::default()).unwrap_err().to_string();
+    let error = articulations::read(&data("ok.json"), Some("opd"), &JointOptions::default()).unwrap_err().to_string();
     assert!(error.contains("\"opd\" is no format of joints; there are paws"), "{error}");
 }
 
@@ -411,7 +411,7 @@ fn lists_of_arti4d_and_egoarti_are_written() {
     assert_eq!((&clip["type"], &clip["object"]), (&json!("revolute"), &json!("wall_cupboard.001")));
     assert_eq!(read("arti4d.json")["wall_door"]["type"], "revolute");
     // What was written is read again.
-    let scene = articulations::read(&dir.path().join("arti4d.json"), None, &Options::default()).unwrap();
+    let scene = articulations::read(&dir.path().join("arti4d.json"), None, &JointOptions::default()).unwrap();
     assert_eq!((scene.format, scene.joints.len()), ("arti4d", 2));
     std::fs::remove_file(dir.path().join("predictions.json")).unwrap();
     let none = paws(&["export", "twin.json", "--format", "egoarti"], dir.path());

@@ -39,9 +39,6 @@ fn missing_files_are_named() {
         std::fs::remove_file(r.join("cameras.json")).unwrap();
     });
     check("no hands", &["hands.json", "fingertips.csv"], |r| std::fs::remove_file(r.join("hands.json")).unwrap());
-    check("no depth at all", &["depth/000000.png", "reconstruction.ply"], |r| {
-        std::fs::remove_dir_all(r.join("depth")).unwrap();
-    });
     check("a listed image", &["frame 3", "frames/000003.jpg", "not there"], |r| {
         std::fs::remove_file(r.join("frames/000003.jpg")).unwrap();
     });
@@ -58,6 +55,12 @@ fn broken_images_are_named() {
             let path = entry.unwrap().path();
             let bytes = std::fs::read(&path).unwrap();
             std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+        }
+    });
+    check("Git LFS pointers", &["depth/", ".png", "git lfs pull"], |r| {
+        for entry in std::fs::read_dir(r.join("depth")).unwrap() {
+            let text = "version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 9\n";
+            std::fs::write(entry.unwrap().path(), text).unwrap();
         }
     });
     check("8-bit depth", &["depth/", "16-bit grey in millimetres"], |r| {
@@ -112,16 +115,49 @@ fn impossible_poses_are_named_with_their_frame() {
 }
 
 #[test]
-fn clips_that_do_not_fit_the_video_are_named() {
+fn clips_of_which_none_fits_the_video_are_named() {
     check("outside", &["clips.json", "clip_000", "outside the video"], |r| {
-        edit(&r.join("clips.json"), |v| v["clips"][0]["end_frame"] = json!(99999));
+        edit(&r.join("clips.json"), |v| {
+            for clip in v["clips"].as_array_mut().unwrap() {
+                clip["end_frame"] = json!(99999);
+            }
+        });
     });
     check("backwards", &["clip_000", "is after end_frame"], |r| {
-        edit(&r.join("clips.json"), |v| v["clips"][0]["end_frame"] = json!(0));
+        edit(&r.join("clips.json"), |v| {
+            for clip in v["clips"].as_array_mut().unwrap() {
+                (clip["start_frame"], clip["end_frame"]) = (json!(50), json!(10));
+            }
+        });
     });
-    check("twice", &["used twice"], |r| {
-        edit(&r.join("clips.json"), |v| v["clips"][1]["clip"] = v["clips"][0]["clip"].clone());
-    });
+}
+
+#[test]
+fn a_clip_that_does_not_fit_the_video_costs_only_itself() {
+    for (name, word, change) in [
+        (
+            "clip_000",
+            "lie outside the video",
+            (|v: &mut Value| v["clips"][0]["end_frame"] = json!(99999)) as fn(&mut Value),
+        ),
+        ("clip_000", "is after end_frame 0", |v| v["clips"][0]["end_frame"] = json!(0)),
+        ("clip_000 (2)", "the name is used twice", |v| v["clips"][1]["clip"] = v["clips"][0]["clip"].clone()),
+    ] {
+        let dir = tempfile::tempdir().unwrap();
+        copy(SMALL.path(), &dir.path().join("rec"));
+        edit(&dir.path().join("rec/clips.json"), change);
+        let out = paws(&["infer", "rec", "--out", "p.json"], dir.path());
+        let text = String::from_utf8_lossy(&out.stdout).into_owned();
+        assert_eq!(out.status.code(), Some(1), "{text}{}", stderr(&out));
+        let row = text.lines().find(|l| l.contains(word)).unwrap_or_default();
+        assert!(row.contains(name), "{word}: {text}");
+        let written: Value = serde_json::from_slice(&std::fs::read(dir.path().join("p.json")).unwrap()).unwrap();
+        let rows = written["predictions"].as_array().unwrap();
+        let of = |n: &str| rows.iter().find(|r| r["clip"] == n).unwrap();
+        assert!(of(name)["type"].is_null() && of(name)["reason"].as_str().unwrap().contains(word), "{written}");
+        assert!(rows.iter().any(|r| !r["type"].is_null()), "{written}");
+        assert_eq!(rows.len(), 3);
+    }
 }
 
 #[test]
@@ -154,7 +190,7 @@ fn scale_hands(recording: &Path, factor: f64) {
 }
 
 #[test]
-fn of_two_recordings_the_one_in_another_unit_is_named() {
+fn of_two_recordings_the_one_in_another_unit_is_named_and_costs_only_itself() {
     let dir = tempfile::tempdir().unwrap();
     copy(SMALL.path(), &dir.path().join("good"));
     copy(SMALL.path(), &dir.path().join("odd"));
@@ -167,9 +203,18 @@ fn of_two_recordings_the_one_in_another_unit_is_named() {
         }
     });
     let out = paws(&["infer", "good", "odd", "--out", "p.json"], dir.path());
-    assert_eq!(out.status.code(), Some(2));
+    assert_eq!(out.status.code(), Some(1));
     assert!(stderr(&out).contains("odd") && stderr(&out).contains("metres"), "{}", stderr(&out));
-    assert!(!dir.path().join("p.json").exists());
+    // The good one has its answer.
+    let text = std::fs::read_to_string(dir.path().join("p.json")).unwrap();
+    assert!(text.contains("\"good\"") && !text.contains("\"odd\"") && text.contains("revolute"), "{text}");
+    assert!(String::from_utf8_lossy(&out.stdout).contains("clip_000"));
+    let out = paws(&["infer", "odd", "nothing.json", "--out", "q.json"], dir.path());
+    assert_eq!(out.status.code(), Some(2));
+    std::fs::create_dir(dir.path().join("empty")).unwrap();
+    let out = paws(&["infer", "odd", "empty", "--out", "q.json"], dir.path());
+    assert!(out.status.code() == Some(2) && stderr(&out).contains("none of the 2 recordings"), "{}", stderr(&out));
+    assert!(!dir.path().join("q.json").exists());
 }
 
 #[test]

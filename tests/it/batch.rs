@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use paws_twin::synth::{Options, Tier};
+use paws_twin::synth::{SynthOptions, Tier};
 
 use crate::common::{paws, record, stderr, tree};
 
@@ -13,7 +13,7 @@ use crate::common::{paws, record, stderr, tree};
 fn recordings(dir: &Path, count: u64) {
     let mut manifest = "name,recording\n".to_owned();
     for i in 0..count {
-        let options = Options { seed: 3 + i, tier: Tier::Clean, width: 96, parts: 1 };
+        let options = SynthOptions { seed: 3 + i, tier: Tier::Clean, width: 96, parts: 1 };
         record(&options, &dir.join(format!("r{i}")));
         manifest += &format!("k{i},r{i}\n");
     }
@@ -96,20 +96,26 @@ fn results_of_another_version_or_other_parameters_are_made_again() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path();
     recordings(path, 1);
-    assert_eq!(paws(&["batch", "m.csv", "--out", "out"], path).status.code(), Some(0));
+    assert_eq!(paws(&["batch", "m.csv", "--out", "out", "--no-textures"], path).status.code(), Some(0));
     let file = path.join("out/journal.jsonl");
     let text = std::fs::read_to_string(&file).unwrap();
     let version = format!("\"version\":\"{}\"", env!("CARGO_PKG_VERSION"));
     assert!(text.contains(&version), "{text}");
     std::fs::write(&file, text.replace(&version, "\"version\":\"0.0.1\"")).unwrap();
-    assert_eq!(paws(&["batch", "m.csv", "--out", "out"], path).status.code(), Some(0));
+    assert_eq!(paws(&["batch", "m.csv", "--out", "out", "--no-textures"], path).status.code(), Some(0));
     assert_eq!(journal(&path.join("out")).len(), 2);
     std::fs::write(path.join("c.toml"), "seed = 5\n").unwrap();
-    assert_eq!(paws(&["batch", "m.csv", "--out", "out", "--config", "c.toml"], path).status.code(), Some(0));
+    assert_eq!(
+        paws(&["batch", "m.csv", "--out", "out", "--no-textures", "--config", "c.toml"], path).status.code(),
+        Some(0)
+    );
     assert_eq!(journal(&path.join("out")).len(), 3);
     // So is one whose twin is gone.
     std::fs::remove_dir_all(path.join("out/twins/k0")).unwrap();
-    assert_eq!(paws(&["batch", "m.csv", "--out", "out", "--config", "c.toml"], path).status.code(), Some(0));
+    assert_eq!(
+        paws(&["batch", "m.csv", "--out", "out", "--no-textures", "--config", "c.toml"], path).status.code(),
+        Some(0)
+    );
     assert_eq!(journal(&path.join("out")).len(), 4);
 }
 
@@ -118,12 +124,12 @@ fn a_batch_that_is_killed_again_and_again_loses_nothing_and_makes_nothing_twice(
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path();
     recordings(path, 4);
-    let whole = paws(&["batch", "m.csv", "--out", "whole"], path);
+    let whole = paws(&["batch", "m.csv", "--out", "whole", "--no-textures"], path);
     assert_eq!(whole.status.code(), Some(0), "{}", stderr(&whole));
     // Longer and longer, so that it ends; the moments differ from run to run by what the machine does.
     for round in 1..=12 {
         let mut command = Command::new(env!("CARGO_BIN_EXE_paws"));
-        command.args(["batch", "m.csv", "--out", "out", "--jobs", "2"]).current_dir(path);
+        command.args(["batch", "m.csv", "--out", "out", "--no-textures", "--jobs", "2"]).current_dir(path);
         let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
         std::thread::sleep(Duration::from_millis(90 * round));
         child.kill().unwrap();
@@ -131,7 +137,7 @@ fn a_batch_that_is_killed_again_and_again_loses_nothing_and_makes_nothing_twice(
         // What it had started ends with it, but not in no time.
         std::thread::sleep(Duration::from_millis(100));
     }
-    let last = paws(&["batch", "m.csv", "--out", "out", "--jobs", "2"], path);
+    let last = paws(&["batch", "m.csv", "--out", "out", "--no-textures", "--jobs", "2"], path);
     assert_eq!(last.status.code(), Some(0), "{}", stderr(&last));
     let mut names: Vec<String> =
         journal(&path.join("out")).iter().map(|entry| entry["name"].as_str().unwrap().to_owned()).collect();
@@ -151,39 +157,114 @@ fn shards_together_are_the_whole() {
     let path = dir.path();
     recordings(path, 3);
     for shard in ["1/2", "2/2"] {
-        let out = paws(&["batch", "m.csv", "--out", "out", "--shard", shard], path);
+        let out = paws(&["batch", "m.csv", "--out", "out", "--no-textures", "--shard", shard], path);
         assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
         assert!(!path.join("out/results.csv").exists());
     }
-    let gathered = paws(&["batch", "m.csv", "--out", "out"], path);
+    let gathered = paws(&["batch", "m.csv", "--out", "out", "--no-textures"], path);
     assert!(stderr(&gathered).contains("3 of 3 recordings are finished already"), "{}", stderr(&gathered));
-    assert_eq!(paws(&["batch", "m.csv", "--out", "whole"], path).status.code(), Some(0));
+    assert_eq!(paws(&["batch", "m.csv", "--out", "whole", "--no-textures"], path).status.code(), Some(0));
     assert_eq!(tables(&path.join("out")), tables(&path.join("whole")));
 }
 
 #[cfg(unix)]
 #[test]
 fn a_worker_that_dies_costs_its_row_and_is_tried_again() {
-    use std::os::unix::fs::PermissionsExt;
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path();
     recordings(path, 2);
     let program = path.join("dies");
     // Dies over the second recording only.
-    let script =
-        format!("#!/bin/sh\ncase \"$*\" in *r1*) kill -9 $$;; esac\nexec \"{}\" \"$@\"\n", env!("CARGO_BIN_EXE_paws"));
-    std::fs::write(&program, script).unwrap();
-    std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let paws_itself = env!("CARGO_BIN_EXE_paws");
+    script(&program, &format!("#!/bin/sh\ncase \"$*\" in *r1*) kill -9 $$;; esac\nexec \"{paws_itself}\" \"$@\"\n"));
     let mut command = Command::new(env!("CARGO_BIN_EXE_paws"));
-    command.args(["batch", "m.csv", "--out", "out"]).env("PAWS_PROGRAM", &program).current_dir(path);
+    command.args(["batch", "m.csv", "--out", "out", "--no-textures", "--worker"]).arg(&program).current_dir(path);
     let out = command.output().unwrap();
     assert_eq!(out.status.code(), Some(1), "{}", stderr(&out));
     let results = rows(&path.join("out/results.csv"));
     assert_eq!((results["k0"][2].as_str(), results["k1"][2].as_str()), ("done", "failed"));
     assert!(results["k1"][11].contains("signal"), "{results:?}");
-    let again = paws(&["batch", "m.csv", "--out", "out"], path);
+    let again = paws(&["batch", "m.csv", "--out", "out", "--no-textures"], path);
     assert_eq!(again.status.code(), Some(0), "{}", stderr(&again));
     assert_eq!(journal(&path.join("out")).len(), 3);
+}
+
+/// The script for Slurm, run by a stand-in for `sbatch` that does one task of the array after the other.
+#[cfg(unix)]
+#[test]
+fn an_array_of_slurm_is_the_whole() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path();
+    recordings(path, 3);
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let program = Path::new(env!("CARGO_BIN_EXE_paws")).parent().unwrap();
+    let search = format!("{}:{}", program.display(), std::env::var("PATH").unwrap());
+    let sbatch = |words: &[&str]| {
+        let mut command = Command::new("bash");
+        command.arg(root.join("tests/slurm/sbatch")).arg(words[0]).arg(root.join("examples/batch.sbatch"));
+        command.args(["m.csv", "out"]).args(&words[1..]).current_dir(path);
+        let done = command.env("PATH", &search).env("PAWS_BATCH_OPTIONS", "--no-textures").output().unwrap();
+        assert!(done.status.success(), "{}", stderr(&done));
+    };
+    sbatch(&["--array=1-2"]);
+    for part in ["journal-1-of-2.jsonl", "journal-2-of-2.jsonl"] {
+        assert!(path.join("out").join(part).is_file(), "{part}");
+    }
+    // A part again makes nothing again.
+    sbatch(&["--array=2-2", "2"]);
+    let gathered = paws(&["batch", "m.csv", "--out", "out", "--no-textures"], path);
+    assert!(stderr(&gathered).contains("3 of 3 recordings are finished already"), "{}", stderr(&gathered));
+    assert_eq!(paws(&["batch", "m.csv", "--out", "whole", "--no-textures"], path).status.code(), Some(0));
+    assert_eq!(tables(&path.join("out")), tables(&path.join("whole")));
+}
+
+/// A program for `--worker` that is a shell script.
+#[cfg(unix)]
+fn script(path: &Path, text: &str) {
+    use std::os::unix::fs::PermissionsExt;
+    std::fs::write(path, text).unwrap();
+    std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o755)).unwrap();
+}
+
+#[cfg(unix)]
+#[test]
+fn the_recordings_of_one_kitchen_go_to_one_process() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path();
+    for folder in ["a", "b"] {
+        std::fs::create_dir_all(path.join(folder)).unwrap();
+    }
+    script(&path.join("says"), "#!/bin/sh\necho \"error: $*\" >&2\nexit 2\n");
+    std::fs::write(path.join("m.jsonl"), "{\"name\": \"k\", \"recordings\": [\"a\", \"b\"]}\n").unwrap();
+    let worker = path.join("says");
+    let worker = worker.to_str().unwrap();
+    let out = paws(&["batch", "m.jsonl", "--out", "out", "--worker", worker, "--worker=-v"], path);
+    assert_eq!(out.status.code(), Some(1), "{}", stderr(&out));
+    let row = &rows(&path.join("out/results.csv"))["k"];
+    assert_eq!(row[1], "a; b");
+    assert_eq!(row[11], "-v twin --with-parent --out out/twins/k -- a b");
+    let recordings = &journal(&path.join("out"))[0]["recordings"];
+    assert_eq!(recordings.as_array().map(Vec::len), Some(2), "{recordings}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_process_that_does_not_end_costs_its_row_and_is_tried_again() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path();
+    std::fs::create_dir_all(path.join("a")).unwrap();
+    script(&path.join("sleeps"), "#!/bin/sh\nexec sleep 100\n");
+    std::fs::write(path.join("m.csv"), "recording\na\n").unwrap();
+    let worker = path.join("sleeps");
+    let worker = worker.to_str().unwrap();
+    for length in [1, 2] {
+        let begun = std::time::Instant::now();
+        let out = paws(&["batch", "m.csv", "--out", "out", "--worker", worker, "--time-limit", "1"], path);
+        assert_eq!(out.status.code(), Some(1), "{}", stderr(&out));
+        assert!(begun.elapsed() < Duration::from_secs(50));
+        assert!(rows(&path.join("out/results.csv"))["a"][11].contains("longer than --time-limit 1"));
+        assert_eq!(journal(&path.join("out")).len(), length);
+    }
 }
 
 #[test]

@@ -8,11 +8,13 @@ use std::sync::{LazyLock, Mutex};
 use paws_twin::config::Config;
 use paws_twin::fitting;
 use paws_twin::geometry::segments::Lsd;
+use paws_twin::math::Pose;
 use paws_twin::pipeline::{self, Scene};
 use paws_twin::reasoning::heuristic::Geometric;
 use paws_twin::recording::Recording;
-use paws_twin::synth::{Options, Recorded, Tier};
+use paws_twin::synth::{Changes, Recorded, SynthOptions, Tier};
 use paws_twin::twin::Twin;
+use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::skips;
@@ -20,13 +22,18 @@ use crate::skips;
 /// A small clean recording that tests copy and break; rendered once.
 pub static SMALL: LazyLock<TempDir> = LazyLock::new(|| {
     let dir = tempfile::tempdir().unwrap();
-    record(&Options { seed: 3, tier: Tier::Clean, width: 160, parts: 1 }, dir.path());
+    record(&SynthOptions { seed: 3, tier: Tier::Clean, width: 160, parts: 1 }, dir.path());
     dir
 });
 
 /// Renders a recording into a folder.
-pub fn record(options: &Options, dir: &Path) {
-    let recorded = Recorded::new(options).unwrap();
+pub fn record(options: &SynthOptions, dir: &Path) {
+    record_varied(options, &Changes::default(), dir);
+}
+
+/// The same with changes; answers with the recording's world from the one that takes of a kitchen share.
+pub fn record_varied(options: &SynthOptions, changes: &Changes, dir: &Path) -> Pose {
+    let recorded = Recorded::varied(options, changes).unwrap();
     let write = |name: &str, bytes: &[u8]| {
         let path = dir.join(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -40,15 +47,16 @@ pub fn record(options: &Options, dir: &Path) {
             write(&name, &bytes);
         }
     }
+    recorded.own_from_kitchen()
 }
 
 /// The whole inference on a folder.
 pub fn twin_of(dir: &Path) -> (Recording, Scene, Twin) {
     let config = Config::default();
     let recording = Recording::open(dir).unwrap();
-    let reasoner = Geometric { reasoning: config.reasoning.clone(), inference: config.inference.clone() };
+    let reasoner = Geometric::of(&config);
     let scene = pipeline::infer(&recording, &config, &Lsd, &reasoner, &|_, _, _| {}).unwrap();
-    let twin = fitting::fit(&scene, &recording.up(), &config.fitting);
+    let twin = fitting::fit(&scene, &recording.up(), &config.fitting, &config.priors);
     (recording, scene, twin)
 }
 
@@ -92,6 +100,17 @@ pub fn paws(args: &[&str], dir: &Path) -> Output {
 /// Standard error as text.
 pub fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// What `paws twin` wrote into `articulations.json` of an output folder, after a look that its clips with an answer open and then
+/// close one thing. What is found in error has no answer.
+pub fn opened_and_closed(out: &Path) -> Value {
+    let found: Value = serde_json::from_str(&std::fs::read_to_string(out.join("articulations.json")).unwrap()).unwrap();
+    let clips = found["clips"].as_array().unwrap().iter();
+    let verbs: Vec<&str> =
+        clips.filter(|c| !c["outcome"]["found"].is_null()).filter_map(|c| c["verb"].as_str()).collect();
+    assert_eq!(verbs, ["open", "close"], "{found}");
+    found
 }
 
 /// Optional data beside the project (`PAWS_DATA`, else `../shared/data`). Without that folder a test that uses it is skipped,

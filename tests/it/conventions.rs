@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
 use paws_twin::math::{Point, Pose, Vector};
 use paws_twin::recording::conventions::{Finding, Subject, findings, repaired};
 use paws_twin::recording::{Recording, Side};
-use paws_twin::synth::{Options, Tier};
+use paws_twin::synth::{SynthOptions, Tier};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -18,7 +18,7 @@ static TIERS: LazyLock<Vec<(Tier, TempDir)>> = LazyLock::new(|| {
         .into_iter()
         .map(|tier| {
             let dir = tempfile::tempdir().unwrap();
-            record(&Options { seed: 1, tier, width: 160, parts: 3 }, dir.path());
+            record(&SynthOptions { seed: 1, tier, width: 160, parts: 3 }, dir.path());
             (tier, dir)
         })
         .collect()
@@ -146,6 +146,74 @@ fn every_wrong_convention_is_named() {
             if !all.iter().any(|f| f.what.contains(words) && !f.evidence.is_empty() && !f.remedy.is_empty()) {
                 lost.push(format!("{} {name}: {all:#?}", tier.name()));
             }
+        }
+    }
+    assert!(lost.is_empty(), "{}", lost.join("\n"));
+}
+
+/// Wrong intrinsics: their name, what they are, words of their finding and its remedy.
+type WrongLens = (&'static str, fn(&mut Recording), [&'static str; 2]);
+
+fn focal(recording: &mut Recording, factor: f64) {
+    recording.camera.fx *= factor;
+    recording.camera.fy *= factor;
+}
+
+const WRONG_LENS: [WrongLens; 7] = [
+    ("half", |r| focal(r, 0.5), ["fx and fy are 0.50 times", "by 2.00"]),
+    ("three quarters", |r| focal(r, 0.75), ["fx and fy are 0.75 times", "by 1.33"]),
+    ("twice", |r| focal(r, 2.0), ["fx and fy are 2.00 times", "by 0.50"]),
+    (
+        "of an image twice as large",
+        |r| {
+            focal(r, 2.0);
+            (r.camera.cx, r.camera.cy) = (2.0 * r.camera.cx + 0.5, 2.0 * r.camera.cy + 0.5);
+        },
+        ["of images 2.00 times as large", "fx, fy, cx and cy by 0.50"],
+    ),
+    (
+        "of an image half as large",
+        |r| {
+            focal(r, 0.5);
+            (r.camera.cx, r.camera.cy) = (0.5 * r.camera.cx - 0.25, 0.5 * r.camera.cy - 0.25);
+        },
+        ["of images 0.50 times as large", "fx, fy, cx and cy by 2.00"],
+    ),
+    (
+        "a principal point of another image",
+        |r| (r.camera.cx, r.camera.cy) = (0.5 * r.camera.cx, 0.5 * r.camera.cy),
+        ["is not the middle of the images", "put cx and cy in the middle"],
+    ),
+    (
+        "a principal point of another image, and positions that are too small",
+        |r| {
+            (r.camera.cx, r.camera.cy) = (0.5 * r.camera.cx, 0.5 * r.camera.cy);
+            poses(r, |p| Pose::from_parts((0.8 * p.translation.vector).into(), p.rotation));
+        },
+        ["is not the middle of the images", "put cx and cy in the middle"],
+    ),
+];
+
+#[test]
+fn wrong_intrinsics_are_named_and_nothing_else_is() {
+    let mut lost = Vec::new();
+    let mut check = |name: &str, right: &Recording| {
+        for (what, change, words) in WRONG_LENS {
+            let mut wrong = right.clone();
+            change(&mut wrong);
+            let all = found(&wrong);
+            let is_told = |f: &Finding| f.what.contains(words[0]) && f.remedy.contains(words[1]) && f.ruinous;
+            if all.len() != 1 || !is_told(&all[0]) {
+                lost.push(format!("{name} {what}: {all:#?}"));
+            }
+        }
+    };
+    for (tier, dir) in TIERS.iter() {
+        check(tier.name(), &Recording::open(dir.path()).unwrap());
+    }
+    for name in ["apartment_clean", "apartment_realistic"] {
+        if let Some(dir) = optional_data(&format!("recordings/{name}")) {
+            check(name, &Recording::open(&dir).unwrap());
         }
     }
     assert!(lost.is_empty(), "{}", lost.join("\n"));

@@ -5,19 +5,19 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use paws_twin::articulation::JointKind;
-use paws_twin::export;
+use paws_twin::export::{self, ExportContext, FORMATS, Purpose};
 use paws_twin::math::{Point, Vector};
-use paws_twin::model::check::{self, Verdict};
+use paws_twin::model::check::{self, PointVerdict};
 use paws_twin::model::furniture::to_twin;
 use paws_twin::model::{self, Model, glb};
-use paws_twin::synth::{Options, Tier};
+use paws_twin::synth::{SynthOptions, Tier};
 use paws_twin::twin::{Role, Twin};
 
 use crate::common::{paws, record, stderr, twin_of};
 
 static SAMPLE: LazyLock<Twin> = LazyLock::new(|| {
     let dir = tempfile::tempdir().unwrap();
-    record(&Options { seed: 11, tier: Tier::Clean, width: 240, parts: 4 }, dir.path());
+    record(&SynthOptions { seed: 11, tier: Tier::Clean, width: 240, parts: 4 }, dir.path());
     twin_of(dir.path()).2
 });
 
@@ -39,6 +39,26 @@ fn read_text(name: &str, text: &str) -> Model {
 
 fn failing(model: &Model) -> Vec<(u8, String)> {
     check::model(model, None).into_iter().flat_map(|p| p.faults.into_iter().map(move |f| (p.id, f))).collect()
+}
+
+#[test]
+fn every_model_that_we_write_is_judged_or_told_why_not() {
+    let (twin, dir) = (&*SAMPLE, tempfile::tempdir().unwrap());
+    for format in FORMATS.iter().filter(|format| format.purpose == Purpose::Model) {
+        let written = (format.write)(twin, &ExportContext::default()).unwrap().files;
+        for (file, bytes) in format.files.iter().zip(written) {
+            let path = dir.path().join(file.name);
+            std::fs::write(&path, bytes).unwrap();
+            match (model::is_model(&path), model::is_gltf(&path)) {
+                (true, true) => drop(glb::read(&path).unwrap()),
+                (true, false) => drop(model::read(&path).unwrap()),
+                (false, _) => {
+                    let error = model::read(&path).unwrap_err().to_string();
+                    assert!(error.contains(file.name) && error.contains(": is "), "{error}");
+                }
+            }
+        }
+    }
 }
 
 #[test]
@@ -90,7 +110,7 @@ fn what_we_write_passes_every_point_that_concerns_it() {
     write_all(&SAMPLE, dir.path());
     for name in ["scene.urdf", "scene.xml", "kitchen.xml"] {
         let points = check::model(&model::read(&dir.path().join(name)).unwrap(), Some(&SAMPLE));
-        let not: Vec<_> = points.iter().filter(|p| p.verdict == Verdict::NotApplicable).map(|p| p.id).collect();
+        let not: Vec<_> = points.iter().filter(|p| p.verdict == PointVerdict::NotApplicable).map(|p| p.id).collect();
         assert!(points.iter().all(|p| p.faults.is_empty()), "{name}: {points:?}");
         assert_eq!(not, if name == "scene.urdf" { vec![6, 7] } else { vec![7] }, "{name}");
     }

@@ -1,11 +1,11 @@
 //! One model in every format: what is written is read back by other code and means the same.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use paws_twin::articulation::JointKind;
-use paws_twin::export;
+use paws_twin::export::{self, ExportContext, FORMATS, Purpose};
 use paws_twin::math::{Point, Pose, Vector};
-use paws_twin::synth::{Options, Tier};
+use paws_twin::synth::{SynthOptions, Tier};
 use paws_twin::twin::{OrientedBox, Role, Solid, Twin, mass_properties};
 use quick_xml::Reader;
 use quick_xml::events::Event;
@@ -14,7 +14,7 @@ use crate::common::{record, twin_of};
 
 fn sample() -> Twin {
     let dir = tempfile::tempdir().unwrap();
-    record(&Options { seed: 11, tier: Tier::Clean, width: 240, parts: 4 }, dir.path());
+    record(&SynthOptions { seed: 11, tier: Tier::Clean, width: 240, parts: 4 }, dir.path());
     let twin = twin_of(dir.path()).2;
     assert_eq!(twin.furniture.len(), 4);
     let kinds: Vec<JointKind> = twin.furniture.iter().map(|f| f.part.joint.articulation.kind).collect();
@@ -316,9 +316,11 @@ fn handles_are_in_the_same_place_in_every_format() {
         ("urdf", of_urdf(&export::urdf::write(&twin, None).unwrap())),
         ("mjcf", of_mjcf(&export::mjcf::write(&twin, None).unwrap())),
         ("gltf", of_glb(&export::gltf::write(&twin, None, &[]).unwrap())),
-        ("gltf with physics", of_physics(&export::gltf::write_physics(&twin).unwrap())),
+        ("gltf-physics", of_physics(&export::gltf::write_physics(&twin).unwrap())),
         ("usd", of_usda(&export::usd::write(&twin, None).unwrap())),
     ];
+    let models = FORMATS.iter().filter(|format| format.purpose == Purpose::Model).map(|format| format.name);
+    assert_eq!(formats.iter().map(|(name, _)| *name).collect::<BTreeSet<_>>(), models.collect::<BTreeSet<_>>());
     for (name, handles) in formats {
         assert_eq!(handles.len(), truth.len(), "{name}");
         for (id, places) in &truth {
@@ -565,14 +567,9 @@ fn a_twin_that_no_simulator_takes_is_refused() {
     ] {
         let mut twin = good.clone();
         break_it(&mut twin);
-        for error in [
-            export::urdf::write(&twin, None).unwrap_err().to_string(),
-            export::mjcf::write(&twin, None).unwrap_err().to_string(),
-            export::gltf::write(&twin, None, &[]).unwrap_err().to_string(),
-            export::gltf::write_physics(&twin).unwrap_err().to_string(),
-            export::usd::write(&twin, None).unwrap_err().to_string(),
-        ] {
-            assert!(error.contains(word), "{error}");
+        for format in FORMATS.iter().filter(|format| format.purpose == Purpose::Model) {
+            let error = (format.write)(&twin, &ExportContext::default()).unwrap_err().to_string();
+            assert!(error.contains(word), "{}: {error}", format.name);
         }
     }
 }

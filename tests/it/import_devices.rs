@@ -239,7 +239,7 @@ fn write_egodex(path: &Path) {
     for (side, name) in [(Side::Left, "left"), (Side::Right, "right")] {
         let hands: Vec<Option<[Point; 21]>> = frames.iter().map(|f| hand(&recording, *f, side)).collect();
         let sure: Vec<f64> = hands.iter().map(|h| if h.is_some() { 0.9 } else { 0.0 }).collect();
-        for (i, joint) in paws_twin::import::joints::ARKIT_NAMES.iter().enumerate() {
+        for (i, joint) in paws_twin::import::joint_orders::ARKIT_NAMES.iter().enumerate() {
             let place = |h: &Option<[Point; 21]>| y_up() * h.map_or_else(Point::origin, |h| h[i]);
             let poses = hands.iter().map(|h| Pose::from_parts(place(h).coords.into(), UnitQuaternion::identity()));
             let rows = matrices(poses);
@@ -342,7 +342,7 @@ pub fn stera_pose(recording: &Recording, frame: usize) -> Pose {
 }
 
 /// Numbers as numpy saves them.
-fn npy(shape: &str, numbers: &[f64]) -> Vec<u8> {
+pub fn npy(shape: &str, numbers: &[f64]) -> Vec<u8> {
     let mut header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}");
     while (10 + header.len() + 1) % 64 != 0 {
         header.push(' ');

@@ -6,7 +6,7 @@ use std::io::Write as _;
 use std::path::Path;
 
 use nalgebra::UnitQuaternion;
-use paws_twin::import::optics::{Lens, Optics};
+use paws_twin::import::optics::{LensModel, Optics};
 use paws_twin::math::{Point, Pose, Vector};
 use paws_twin::recording::Recording;
 use serde_json::{Value, json};
@@ -134,7 +134,7 @@ fn quarter() -> Pose {
 
 /// The glasses' colour camera: a fisheye that lies on its side.
 fn fisheye() -> Optics {
-    let lens = Lens::FisheyeRadTanThinPrism {
+    let lens = LensModel::FisheyeRadTanThinPrism {
         k: [0.02, -0.01, 0.0, 0.0, 0.0, 0.0],
         p: [0.0003, -0.0002],
         s: [0.001, -0.0001, -0.0004, 0.0001],
@@ -250,7 +250,7 @@ fn write_fisheye(root: &Path) {
 }
 
 fn params(o: &Optics) -> Vec<f64> {
-    let Lens::FisheyeRadTanThinPrism { k, p, s } = o.lens else { panic!("{:?}", o.lens) };
+    let LensModel::FisheyeRadTanThinPrism { k, p, s } = o.lens else { panic!("{:?}", o.lens) };
     [[o.fx, o.cx, o.cy].as_slice(), k.as_slice(), p.as_slice(), s.as_slice()].concat()
 }
 

@@ -1,21 +1,22 @@
 //! The whole pipeline on kitchens whose answer is known: without noise, then with the errors of real estimators.
 
 use paws_twin::articulation::JointKind;
-use paws_twin::evaluation::{Report, Rule, Truth, evaluate};
+use paws_twin::config::Config;
+use paws_twin::evaluation::{EvaluationReport, Rule, Truth, evaluate, room_fit};
 use paws_twin::fitting::overlap;
 use paws_twin::report::files::predictions;
-use paws_twin::synth::{Options, Tier};
+use paws_twin::synth::{SynthOptions, Tier};
 
 use crate::common::{record, twin_of};
 
-fn report(seed: u64, tier: Tier, parts: usize) -> Report {
+fn report(seed: u64, tier: Tier, parts: usize) -> EvaluationReport {
     let dir = tempfile::tempdir().unwrap();
-    record(&Options { seed, tier, width: 320, parts }, dir.path());
+    record(&SynthOptions { seed, tier, width: 320, parts }, dir.path());
     let (_, scene, twin) = twin_of(dir.path());
     evaluate(&predictions(&scene, &twin), &[Truth::read(dir.path()).unwrap()])
 }
 
-fn shares(report: &Report, rule: Rule) -> [f64; 3] {
+fn shares(report: &EvaluationReport, rule: Rule) -> [f64; 3] {
     let micro = report.rules.iter().find(|r| r.rule == rule).unwrap().micro;
     [micro.m, micro.ma, micro.mao]
 }
@@ -40,7 +41,7 @@ fn without_noise_every_joint_is_right_to_a_degree_and_a_few_centimetres() {
 #[test]
 fn parts_open_as_far_as_expected_and_touch_neither_neighbours_nor_the_room() {
     let dir = tempfile::tempdir().unwrap();
-    record(&Options { seed: 105, tier: Tier::Clean, width: 320, parts: 6 }, dir.path());
+    record(&SynthOptions { seed: 105, tier: Tier::Clean, width: 320, parts: 6 }, dir.path());
     let (_, _, twin) = twin_of(dir.path());
     assert!(!twin.room.is_empty(), "nothing of the room was built");
     for (i, f) in twin.furniture.iter().enumerate() {
@@ -61,6 +62,19 @@ fn parts_open_as_far_as_expected_and_touch_neither_neighbours_nor_the_room() {
     }
     let further = twin.furniture.iter().filter(|f| f.part.joint.upper > f.part.joint.observed + 0.02).count();
     assert!(2 * further > twin.furniture.len(), "{further} of {} open further than seen", twin.furniture.len());
+}
+
+#[test]
+fn the_room_is_few_boxes_that_fill_no_air_and_lack_little() {
+    // Without noise depth is the truth.
+    let dir = tempfile::tempdir().unwrap();
+    record(&SynthOptions { seed: 106, tier: Tier::Clean, width: 320, parts: 3 }, dir.path());
+    let (recording, scene, twin) = twin_of(dir.path());
+    let fit = room_fit::measure(&recording, &scene, &twin, &Config::default().fitting).unwrap();
+    assert!(fit.surface_cells > 10_000, "{fit:?}");
+    assert!(fit.room_boxes + fit.carcass_boxes < 60 && fit.blocked_openings == 0, "{fit:?}");
+    // Of what is missing most is smaller than the smallest box.
+    assert!(fit.filled() < Some(0.02) && fit.missing() < Some(0.05), "{fit:?}");
 }
 
 #[test]

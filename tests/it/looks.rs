@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::Path;
 
 use paws_twin::articulation::{Articulation, JointKind};
-use paws_twin::export::{self, dress};
+use paws_twin::export::{self, ExportContext, FORMATS, Purpose, dress};
 use paws_twin::look::{Look, Texture, TexturedMesh};
 use paws_twin::math::{Point, Vector};
 use paws_twin::twin::{Furniture, Joint, OrientedBox, Part, Role, Solid, Twin};
@@ -90,16 +90,12 @@ fn files() -> BTreeMap<String, Vec<u8>> {
 /// All files of a twin with a look.
 fn write_all(dir: &Path, twin: &Twin, look: &Look, verdicts: &[(String, String)]) {
     let mut all: BTreeMap<String, Vec<u8>> = dress::files(twin, look).unwrap().into_iter().collect();
-    let look = Some(look);
-    let mut add = |name: &str, bytes: Vec<u8>| all.insert(name.to_owned(), bytes);
-    add("scene.urdf", export::urdf::write(twin, look).unwrap().into_bytes());
-    add("scene.xml", export::mjcf::write(twin, look).unwrap().into_bytes());
-    add("kitchen.xml", export::mjcf::write_model(twin, look).unwrap().into_bytes());
-    add("scene.glb", export::gltf::write(twin, look, verdicts).unwrap());
-    add("physics.glb", export::gltf::write_physics(twin).unwrap());
-    add("scene.usda", export::usd::write(twin, look).unwrap().into_bytes());
-    add("scene.usdz", export::usd::write_package(twin, look).unwrap());
-    add("twin.json", paws_twin::json::text(twin).unwrap().into_bytes());
+    let beside = ExportContext { look: Some(look), verdicts, ..ExportContext::default() };
+    for format in FORMATS.iter().filter(|format| format.purpose == Purpose::Model) {
+        let written = (format.write)(twin, &beside).unwrap().files;
+        all.extend(format.files.iter().map(|file| file.name.to_owned()).zip(written));
+    }
+    all.insert("twin.json".to_owned(), paws_twin::json::text(twin).unwrap().into_bytes());
     for (name, bytes) in all {
         let path = dir.join(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -341,10 +337,7 @@ fn the_look_of_a_twins_folder_is_exported_again_byte_for_byte() {
     let out = crate::common::paws(&["export", "made", "--out", "again"], dir.path());
     assert!(out.status.success(), "{}", crate::common::stderr(&out));
     let mut expected: Vec<String> = files().into_keys().collect();
-    expected.extend(
-        ["scene.urdf", "scene.xml", "kitchen.xml", "scene.glb", "physics.glb", "scene.usda", "scene.usdz"]
-            .map(str::to_owned),
-    );
+    expected.extend(export::names_of(Purpose::Model).map(str::to_owned));
     for name in expected {
         let [made, again] = ["made", "again"].map(|folder| std::fs::read(dir.path().join(folder).join(&name)));
         assert!(made.unwrap() == again.unwrap(), "{name} differs");

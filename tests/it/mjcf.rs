@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use paws_twin::error::Result;
 use paws_twin::math::{Point, Vector};
-use paws_twin::model::check::{self, Verdict};
+use paws_twin::model::check::{self, PointVerdict};
 use paws_twin::model::furniture::to_twin;
-use paws_twin::model::{self, Kind, Model};
+use paws_twin::model::{self, JointType, Model};
 
 use crate::common::{paws, stderr};
 
@@ -18,11 +18,11 @@ fn read(name: &str) -> Result<Model> {
     model::read(&file(name))
 }
 
-fn points(name: &str) -> Vec<check::Point> {
+fn points(name: &str) -> Vec<check::CheckedPoint> {
     check::model(&read(name).unwrap(), None)
 }
 
-fn point(name: &str, id: u8) -> check::Point {
+fn point(name: &str, id: u8) -> check::CheckedPoint {
     points(name).into_iter().find(|p| p.id == id).unwrap()
 }
 
@@ -49,7 +49,7 @@ fn what_mujoco_refuses_does_not_load_without_a_word() {
         ("unknown_elem", "<region name=\"r\">: MJCF has no such element"),
     ] {
         let one = point(&format!("12_mjcf/{name}.xml"), 1);
-        assert_eq!(one.verdict, Verdict::Fail, "{name}");
+        assert_eq!(one.verdict, PointVerdict::Fail, "{name}");
         assert!(one.faults.iter().any(|f| f.contains(word)), "{name}: {:?}", one.faults);
     }
     for (name, word) in [
@@ -93,6 +93,7 @@ fn what_mujoco_loads_loads() {
         "degrees_default",
         "equality_joint",
         "equality_weld",
+        "eulerseq_bad",
         "eulerseq_xyz_caps",
         "exclude_welded",
         "frame_wrap",
@@ -117,12 +118,12 @@ fn what_mujoco_loads_loads() {
         "two_defaults",
     ] {
         let one = point(&format!("12_mjcf/{name}.xml"), 1);
-        assert_eq!(one.verdict, Verdict::Pass, "{name}: {:?}", one.faults);
+        assert_eq!(one.verdict, PointVerdict::Pass, "{name}: {:?}", one.faults);
     }
 }
 
 /// What point 1 says of a text: its verdict and its faults.
-fn loads(text: &str) -> (Verdict, Vec<String>) {
+fn loads(text: &str) -> (PointVerdict, Vec<String>) {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("m.xml");
     std::fs::write(&path, text).unwrap();
@@ -162,9 +163,16 @@ fn values_that_mujoco_refuses_are_told() {
         ("<site size='-1'/>", "must be positive"),
         ("<site type='plane'/>", "not for sites"),
         ("<site fromto='0 0 0 0 0 1' type='sphere'/>", "fromto is not for"),
+        ("<body><plugin plugin='foo'/><geom size='.1'/></body>", "no plugin \"foo\" is declared in <extension>"),
+        ("<body><plugin/><geom size='.1'/></body>", "neither plugin nor instance"),
+        (
+            "<body><joint/><inertial pos='0 0 0' mass='1' fullinertia='1 1 1 0 0 0' diaginertia='1 1 1'/></body>",
+            "both fullinertia and diaginertia",
+        ),
+        ("<body><joint axis='0 0 1e-8'/><geom size='.1'/></body>", "its axis is 0"),
     ] {
         let (verdict, faults) = loads(&scene("", body, ""));
-        assert!(verdict == Verdict::Fail && faults.iter().any(|f| f.contains(word)), "{body}: {faults:?}");
+        assert!(verdict == PointVerdict::Fail && faults.iter().any(|f| f.contains(word)), "{body}: {faults:?}");
     }
     for (before, word) in [
         ("<asset><texture name='t'/></asset>", "neither file nor builtin"),
@@ -175,9 +183,18 @@ fn values_that_mujoco_refuses_are_told() {
         ("<asset><hfield name='h' nrow='2' ncol='2' size='1 1 0 1'/></asset>", "must be positive"),
         ("<asset><model name='m' file='gone.xml'/></asset>", "gone.xml: there is no such file"),
         ("<statistic extent='0'/>", "extent must be positive"),
+        ("<extension><plugin plugin='foo.bar'/></extension>", "plugin \"foo.bar\" does not come with MuJoCo"),
+        ("<size memory='10Q'/>", "memory=\"10Q\" is no size"),
+        ("<size memory=''/>", "is no size"),
+        ("<size memory='10M' njmax='5'/>", "both memory and njmax"),
+        ("<size nstack='-2'/>", "nstack must not be below -1"),
+        ("<custom><text name='a' data=''/></custom>", "its text is empty"),
+        ("<custom><numeric name='a'/></custom>", "holds 0 numbers"),
+        ("<custom><numeric name='a' size='1' data='1 2'/></custom>", "more numbers than size"),
+        ("<custom><tuple name='a'/></custom>", "is empty: add elements"),
     ] {
         let (verdict, faults) = loads(&scene(before, "", ""));
-        assert!(verdict == Verdict::Fail && faults.iter().any(|f| f.contains(word)), "{before}: {faults:?}");
+        assert!(verdict == PointVerdict::Fail && faults.iter().any(|f| f.contains(word)), "{before}: {faults:?}");
     }
     for (after, word) in [
         ("<equality><weld/></equality>", "ties nothing"),
@@ -190,6 +207,21 @@ fn values_that_mujoco_refuses_are_told() {
         ("<actuator><damper joint='j' kv='1'/></actuator>", "no ctrlrange that goes up"),
         ("<actuator><motor cranksite='s'/></actuator>", "slidersite"),
         ("<tendon><fixed/></tendon>", "its path is empty"),
+        ("<tendon><fixed limited='true'><joint joint='j' coef='1'/></fixed></tendon>", "no range that goes up"),
+        (
+            "<tendon><fixed actuatorfrclimited='true'><joint joint='j' coef='1'/></fixed></tendon>",
+            "no actuatorfrcrange",
+        ),
+        ("<tendon><fixed springlength='1 0'><joint joint='j' coef='1'/></fixed></tendon>", "springlength"),
+        ("<tendon><spatial width='0'><site site='s'/><site site='t'/></spatial></tendon>", "width must be positive"),
+        (
+            "<compiler autolimits='false'/><tendon><fixed range='0 1'><joint joint='j' coef='1'/></fixed></tendon>",
+            "autolimits is off",
+        ),
+        (
+            "<default><tendon limited='true'/></default><tendon><fixed><joint joint='j' coef='1'/></fixed></tendon>",
+            "no range that goes up",
+        ),
         ("<tendon><fixed><joint joint='j'/></fixed></tendon>", "needs the attribute \"coef\""),
         ("<tendon><fixed><joint joint='free' coef='1'/></fixed></tendon>", "neither a hinge nor a slide"),
         ("<tendon><spatial><site site='s'/></spatial></tendon>", "two sites or geoms"),
@@ -200,7 +232,7 @@ fn values_that_mujoco_refuses_are_told() {
         ("<keyframe><key ctrl='0'/></keyframe>", "ctrl has 1 numbers, the model 0"),
     ] {
         let (verdict, faults) = loads(&scene("", "", after));
-        assert!(verdict == Verdict::Fail && faults.iter().any(|f| f.contains(word)), "{after}: {faults:?}");
+        assert!(verdict == PointVerdict::Fail && faults.iter().any(|f| f.contains(word)), "{after}: {faults:?}");
     }
 }
 
@@ -227,6 +259,17 @@ fn values_that_mujoco_takes_pass() {
         ),
         ("", "", "<actuator><motor joint='j' ctrlrange='1 0'/></actuator>"),
         ("", "", "<equality><connect site1='s' site2='t'/></equality>"),
+        (
+            "<size memory='10k' nconmax='5'/>",
+            "",
+            "<custom><text name='a' data=' '/><numeric name='b' size='3'/></custom>",
+        ),
+        (
+            "<extension><plugin plugin='mujoco.elasticity.cable'><instance name='i'/></plugin></extension>",
+            "<body><plugin instance='i'/><geom size='.1'/></body><body><plugin plugin='mujoco.elasticity.cable'/></body>",
+            "<tendon><fixed limited='true' range='0 1'><joint joint='j' coef='1'/></fixed></tendon>",
+        ),
+        ("", "<body><inertial pos='0 0 0' mass='1' fullinertia='1 1 1 0 0 0' diaginertia='0 0 0'/></body>", ""),
         // The rest is the model's own pose.
         ("", "", "<keyframe><key qpos='0' qvel='0 0'/></keyframe>"),
         (
@@ -236,8 +279,58 @@ fn values_that_mujoco_takes_pass() {
         ),
     ] {
         let (verdict, faults) = loads(&scene(before, body, after));
-        assert_eq!(verdict, Verdict::Pass, "{before}{body}{after}: {faults:?}");
+        assert_eq!(verdict, PointVerdict::Pass, "{before}{body}{after}: {faults:?}");
     }
+}
+
+#[test]
+fn an_order_of_euler_angles_is_judged_where_it_is_used() {
+    let turned = |attributes: &str| {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("m.xml");
+        let text = scene("<compiler eulerseq='zxq'/>", &format!("<body {attributes}><geom size='.1'/></body>"), "");
+        std::fs::write(&path, text).unwrap();
+        model::read(&path).map(|_| ()).map_err(|e| e.to_string())
+    };
+    assert_eq!(turned("quat='0 1 0 0'"), Ok(()));
+    assert!(turned("euler='0 0 1'").unwrap_err().contains("eulerseq has a letter that is none of"));
+}
+
+#[test]
+fn a_flag_that_switches_limits_off_leaves_none() {
+    let door = std::fs::read_to_string(file("12_mjcf/ok.xml")).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("m.xml");
+    for (flags, limited) in [
+        ("<flag limit=\"disable\"/>", false),
+        ("<flag constraint=\"disable\"/>", false),
+        ("<flag limit=\"disable\"/></option><option><flag limit=\"enable\"/>", true),
+        ("<flag contact=\"enable\"/>", true),
+    ] {
+        let text = door.replacen("<worldbody>", &format!("<option>{flags}</option><worldbody>"), 1);
+        std::fs::write(&path, text).unwrap();
+        let model = model::read(&path).unwrap();
+        assert_eq!(model.moving().all(|(_, j)| j.limits().is_some()), limited, "{flags}");
+        let two = check::model(&model, None).into_iter().find(|p| p.id == 2).unwrap();
+        assert_eq!(
+            two.faults.iter().any(|f| f.contains("a <flag> of the file switches all limits off")),
+            !limited,
+            "{two:?}"
+        );
+    }
+}
+
+#[test]
+fn a_joint_that_is_held_is_left_out_of_the_twin_with_its_reason() {
+    let (twin, _) = to_twin(&read("12_mjcf/equality_weld.xml").unwrap());
+    assert!(twin.furniture.is_empty() && twin.left_out.len() == 1, "{:?}", twin.left_out);
+    assert!(twin.left_out[0].id == "hinge" && twin.left_out[0].reason.contains("<weld> holds it fast"));
+    let (twin, notes) = to_twin(&read("12_mjcf/contype0.xml").unwrap());
+    assert_eq!(twin.furniture.len(), 1);
+    assert!(
+        notes.iter().any(|n| n.starts_with("hinge: none of its part's shapes takes part in contacts")),
+        "{notes:?}"
+    );
 }
 
 #[test]
@@ -246,7 +339,7 @@ fn bodies_beside_the_world_are_lost_and_not_refused() {
     let path = dir.path().join("m.xml");
     std::fs::write(&path, "<mujoco>\n<body name=\"lost\"><geom size=\"1\"/></body></mujoco>").unwrap();
     let points = check::model(&model::read(&path).unwrap(), None);
-    assert_eq!(points[0].verdict, Verdict::Pass, "{points:?}");
+    assert_eq!(points[0].verdict, PointVerdict::Pass, "{points:?}");
     let four = points.iter().find(|p| p.id == 4).unwrap();
     assert!(four.faults.iter().any(|f| f.starts_with("line 2, <body name=\"lost\">: stands outside")), "{four:?}");
 }
@@ -260,7 +353,7 @@ fn an_attached_model_brings_its_own_materials() {
         <geom size="1" material="oak"/><attach model="c" prefix=""/></worldbody></mujoco>"#;
     std::fs::write(&path, text).unwrap();
     let points = check::model(&model::read(&path).unwrap(), None);
-    assert_eq!(points[0].verdict, Verdict::NotJudged, "{points:?}");
+    assert_eq!(points[0].verdict, PointVerdict::NotJudged, "{points:?}");
 }
 
 #[test]
@@ -284,7 +377,7 @@ fn includes_are_read_where_mujoco_reads_them() {
     assert!(error.contains("includes gone.xml, which is not there") && error.contains("class \"c\""), "{error}");
     let fault = "line 2, <include>: includes gone.xml, which is not there";
     assert!(points[0].faults.iter().any(|f| f.contains(fault)), "{points:?}");
-    assert_eq!(points[1].verdict, Verdict::NotJudged);
+    assert_eq!(points[1].verdict, PointVerdict::NotJudged);
 }
 
 #[test]
@@ -302,7 +395,10 @@ fn each_point_says_what_is_wrong() {
         ("18_hairline/t0.05.xml", 11, "which stops it"),
     ] {
         let point = point(name, id);
-        assert!(point.verdict == Verdict::Fail && point.faults.iter().any(|f| f.contains(word)), "{name}: {point:?}");
+        assert!(
+            point.verdict == PointVerdict::Fail && point.faults.iter().any(|f| f.contains(word)),
+            "{name}: {point:?}"
+        );
     }
     for (name, id) in [
         ("12_mjcf/exclude_welded.xml", 11),
@@ -316,7 +412,7 @@ fn each_point_says_what_is_wrong() {
         ("22_inertia_static/static_base.xml", 3),
     ] {
         let point = point(name, id);
-        assert_eq!(point.verdict, Verdict::Pass, "{name}: {point:?}");
+        assert_eq!(point.verdict, PointVerdict::Pass, "{name}: {point:?}");
     }
     let ball = point("12_mjcf/ball.xml", 2);
     assert!(ball.told.iter().any(|t| t.contains("hinge: moves in several directions")), "{ball:?}");
@@ -430,5 +526,5 @@ fn all_bodies_together_weigh_what_the_file_says() {
     let model = read("12_mjcf/settotalmass.xml").unwrap();
     let total: f64 = model.links.iter().filter_map(|l| l.mass).sum();
     assert!((total - 20.0).abs() < 1e-9, "{total}");
-    assert!(model.joints.iter().any(|j| j.kind == Kind::Revolute));
+    assert!(model.joints.iter().any(|j| j.kind == JointType::Revolute));
 }

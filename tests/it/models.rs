@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use paws_twin::model::check::{self, Point};
+use paws_twin::model::check::{self, CheckedPoint, PointVerdict};
 use paws_twin::model::{self, glb};
 
 use crate::common::{paws, stderr};
@@ -12,7 +12,7 @@ fn data(name: &str) -> PathBuf {
 }
 
 /// Faults with the numbers of their points.
-fn faults(points: &[Point]) -> Vec<(u8, String)> {
+fn faults(points: &[CheckedPoint]) -> Vec<(u8, String)> {
     points.iter().flat_map(|p| p.faults.iter().map(move |f| (p.id, f.clone()))).collect()
 }
 
@@ -47,6 +47,79 @@ fn what_simulators_refuse_of_a_urdf_is_a_fault() {
         let found = faults(&check::model(&model, None));
         assert!(found.is_empty(), "{name}: {found:?}");
         assert_eq!(model.notes.iter().any(|n| n.contains("planar joints are not judged")), name == "planar");
+    }
+}
+
+#[test]
+fn units_and_names_of_a_urdf_that_are_wrong_are_faults() {
+    let good = std::fs::read_to_string(data("urdf/ok.urdf")).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::create_dir(dir.path().join("meshes")).unwrap();
+    std::fs::copy(data("urdf/meshes/door.obj"), dir.path().join("meshes/door.obj")).unwrap();
+    let four = "v 0 0 0\nv .5 0 0\nv 0 .02 0\nv 0 0 .7\n";
+    std::fs::write(dir.path().join("meshes/beyond.obj"), format!("{four}f 1 2 9\n")).unwrap();
+    std::fs::write(dir.path().join("cut.png"), b"\x89PNG\r\n\x1a\n").unwrap();
+    let panel = "<box size=\"0.59 0.02 0.78\"/>";
+    let visual = |material: &str| {
+        format!(
+            "<visual><geometry><box size=\".1 .1 .1\"/></geometry>{material}</visual><collision name=\"door_panel\">"
+        )
+    };
+    let oak = visual("<material name=\"oak\"/>");
+    let cut = visual("<material name=\"oak\"><texture filename=\"cut.png\"/></material>");
+    let cases: [(&str, &str, u8, &str); 12] = [
+        (
+            "xyz=\"-0.3 0 0.5\"",
+            "xyz=\"-300 0 500\"",
+            5,
+            "hinge: stands 583.10 m from the origin of base, which reaches 1.0",
+        ),
+        (
+            panel,
+            "<mesh filename=\"meshes/door.obj\" scale=\"0.001 0.001 0.001\"/>",
+            5,
+            "mm large; sizes are metres here, look at the scale of its mesh",
+        ),
+        (
+            panel,
+            "<box size=\"590 20 780\"/>",
+            5,
+            "is 780 m large; sizes are metres here, write 780 millimetres as 0.780",
+        ),
+        (panel, "<mesh filename=\"meshes/beyond.obj\"/>", 1, "names vertex 9, there are 4: MuJoCo refuses"),
+        (
+            "fusestatic=\"false\"",
+            "fusestatic=\"no\"",
+            1,
+            "fusestatic=\"no\": expected one of false, true: MuJoCo refuses",
+        ),
+        ("<mujoco>", "<mujoco/><mujoco>", 1, "<mujoco> is there twice"),
+        ("<compiler ", "<size memory=\"10Q\"/><compiler ", 1, "memory=\"10Q\" is no size"),
+        ("xyz=\"0 0 -1\"", "xyz=\"0 0 1e-9\"", 1, "its axis is 0: MuJoCo refuses"),
+        ("xyz=\"-0.3 0 0.5\"", "xyz=\"-0.3 0 0.5\" rpy=\"0 0 90\"", 5, "90 degrees are 1.5708"),
+        ("<collision name=\"door_panel\">", &oak, 1, "door: material oak (line 8) is described nowhere"),
+        ("<collision name=\"door_panel\">", &cut, 1, "texture cut.png is a PNG that is cut off"),
+        ("</robot>", "<transmission name=\"t\"><joint name=\"nope\"/></transmission></robot>", 1, "its joint nope"),
+    ];
+    for (from, to, id, word) in cases {
+        let text = good.replacen(from, to, 1);
+        assert_ne!(text, good, "{from}");
+        let path = dir.path().join("m.urdf");
+        std::fs::write(&path, text).unwrap();
+        let found = faults(&check::model(&model::read(&path).unwrap(), None));
+        assert!(found.iter().any(|(i, f)| *i == id && f.contains(word)), "{to}: {found:?}");
+        // Boxes have no scale.
+        assert!(to.contains("mesh") || found.iter().all(|(_, f)| !f.contains("scale=")), "{to}: {found:?}");
+    }
+    for (from, to) in [
+        ("fusestatic=\"false\"", "fusestatic=\"false\" foo=\"no\""),
+        ("xyz=\"0 0 -1\"", "xyz=\"0 0 -1e-6\""),
+        ("xyz=\"-0.3 0 0.5\"", "xyz=\"-0.3 0 0.5\" rpy=\"0 0 -3.1\""),
+    ] {
+        let path = dir.path().join("m.urdf");
+        std::fs::write(&path, good.replacen(from, to, 1)).unwrap();
+        let found = faults(&check::model(&model::read(&path).unwrap(), None));
+        assert!(found.iter().all(|(id, _)| ![1, 5].contains(id)), "{to}: {found:?}");
     }
 }
 
@@ -150,6 +223,87 @@ fn what_is_wrong_in_a_gltf_is_a_fault_of_its_point() {
     ] {
         let (found, _) = scene(&data("gltf").join(name));
         assert!(found.iter().any(|(i, f)| *i == id && f.contains(word)), "{name}: {found:?}");
+    }
+}
+
+/// What is said of a text glTF that lies in a folder of its own.
+fn of_gltf(json: &serde_json::Value) -> Vec<CheckedPoint> {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().join("m");
+    std::fs::create_dir(&folder).unwrap();
+    std::fs::write(dir.path().join("x.bin"), [0; 64]).unwrap();
+    std::fs::write(folder.join("m.gltf"), json.to_string()).unwrap();
+    check::scene(&glb::read(&folder.join("m.gltf")).unwrap(), None)
+}
+
+fn verdict(points: &[CheckedPoint], id: u8) -> PointVerdict {
+    points.iter().find(|p| p.id == id).unwrap().verdict
+}
+
+#[test]
+fn a_registered_extension_that_is_required_is_worth_knowing() {
+    let text = std::fs::read_to_string(data("gltf/embedded.gltf")).unwrap();
+    let good: serde_json::Value = serde_json::from_str(&text).unwrap();
+    for name in ["MSFT_texture_dds", "OMI_physics_body", "VRMC_vrm", "ADOBE_materials_x"] {
+        let mut json = good.clone();
+        json["extensionsUsed"] = serde_json::json!([name]);
+        json["extensionsRequired"] = serde_json::json!([name]);
+        let points = of_gltf(&json);
+        assert_eq!(verdict(&points, 7), PointVerdict::Pass, "{name}: {points:?}");
+        let seven = points.iter().find(|p| p.id == 7).unwrap();
+        assert!(seven.told.iter().any(|t| t.starts_with(name)), "{seven:?}");
+    }
+}
+
+#[test]
+fn animations_that_break_the_format_are_faults_and_unread_ones_are_not_judged() {
+    let text = std::fs::read_to_string(data("gltf/embedded.gltf")).unwrap();
+    let good: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let pointer = |to: &str| {
+        let mut json = good.clone();
+        json["extensionsUsed"] = serde_json::json!(["KHR_animation_pointer"]);
+        json["animations"][0]["channels"][0]["target"] =
+            serde_json::json!({"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": to}}});
+        json
+    };
+    let mut twice = good.clone();
+    let channel = twice["animations"][0]["channels"][0].clone();
+    twice["animations"][0]["channels"].as_array_mut().unwrap().push(channel);
+    // The rotations, twice as long.
+    let mut long = good.clone();
+    let turns: Vec<u8> =
+        [0f32, 1.0, 0.0, 0.0, 0.0, 2.0, 0.0, 1.0, 0.0, 1.7].iter().flat_map(|x| x.to_le_bytes()).collect();
+    let uri = "data:application/octet-stream;base64,";
+    let bytes = base64::Engine::encode(&base64::engine::general_purpose::STANDARD, turns);
+    long["buffers"] = serde_json::json!([{"byteLength": 40, "uri": format!("{uri}{bytes}")}]);
+    long["bufferViews"] = serde_json::json!([{"buffer": 0, "byteLength": 8},
+        {"buffer": 0, "byteOffset": 8, "byteLength": 32}, {"buffer": 0, "byteLength": 24}]);
+    for (json, word) in [
+        (pointer("/nodes/99/rotation"), "an animation points at /nodes/99/rotation, there are 3 nodes"),
+        (pointer("/materials/0/emissiveFactor"), "there are 0 materials"),
+        (pointer("nodes"), "pointers begin with /"),
+        (twice, "door_pivot: two channels of one animation set its rotation"),
+        (long, "a rotation has length 2"),
+    ] {
+        let found = faults(&of_gltf(&json));
+        assert!(found.len() == 1 && found[0].0 == 7 && found[0].1.contains(word), "{word}: {found:?}");
+    }
+    let mut sparse = good.clone();
+    sparse["accessors"][1]["sparse"] = serde_json::json!({"count": 1,
+        "indices": {"bufferView": 0, "componentType": 5125}, "values": {"bufferView": 1}});
+    let mut elsewhere = good.clone();
+    elsewhere["buffers"] = serde_json::json!([{"byteLength": 64, "uri": "../x.bin"}]);
+    let mut picture = good.clone();
+    picture["images"] = serde_json::json!([{"uri": "https://example.org/x.png"}]);
+    for (json, one, seven) in [
+        (pointer("/nodes/1/rotation"), PointVerdict::Pass, PointVerdict::Pass),
+        (pointer("/nodes/1/weights"), PointVerdict::Pass, PointVerdict::Pass),
+        (sparse, PointVerdict::Pass, PointVerdict::NotJudged),
+        (elsewhere, PointVerdict::NotJudged, PointVerdict::NotJudged),
+        (picture, PointVerdict::NotJudged, PointVerdict::Pass),
+    ] {
+        let points = of_gltf(&json);
+        assert_eq!((verdict(&points, 1), verdict(&points, 7)), (one, seven), "{points:?}");
     }
 }
 

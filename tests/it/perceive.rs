@@ -107,7 +107,10 @@ fn sources_that_cannot_be_perceived_are_told() {
         ("rec said.srt --out out", "is a recording already"),
         ("nowhere --out out", "nowhere: no such file"),
         ("rec --out out --weights nowhere", "--weights wants a folder"),
-        ("rec --out out --redo poses", "of which hands alone are made"),
+        ("rec --out out --redo poses", "whose poses stay"),
+        ("rec --out out --redo depth", "--depth-model DIR"),
+        ("rec --out out --by depth=moge", "--depth-model"),
+        ("rec --out out --by poses", "STREAM=NETWORK"),
         ("rec --out out --depth-model nowhere", "--depth-model wants a folder"),
     ] {
         let args: Vec<&str> = line.split(' ').collect();
@@ -221,4 +224,12 @@ fn the_real_network_finds_rendered_hands_where_they_are() {
     assert_eq!(run("again").status.code(), Some(0));
     let [one, two] = ["out", "again"].map(|name| std::fs::read(home.path().join(name).join("hands.json")).unwrap());
     assert!(one == two);
+    // Masks of hands are made of their joints.
+    let args = ["out", "--make", "masks", "--out", "masked", "--cache", "kept", "--python", &python];
+    let out = words(&args, home.path(), None);
+    assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+    let masks = std::fs::read_dir(home.path().join("masked/masks")).unwrap().count();
+    assert!(masks as u64 == FRAMES, "{masks}: {}", stderr(&out));
+    let origin = std::fs::read_to_string(home.path().join("masked/import.json")).unwrap();
+    assert!(origin.contains("hand-joints") && origin.contains("mediapipe-hands"), "{origin}");
 }

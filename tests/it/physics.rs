@@ -5,7 +5,7 @@ use paws_twin::articulation::{Action, Articulation, JointKind};
 use paws_twin::config::Config;
 use paws_twin::hands::{Sample, Trajectory};
 use paws_twin::math::{Point, Vector};
-use paws_twin::report::pictures;
+use paws_twin::report::drawings;
 use paws_twin::twin::{ContactRule, ContactRules, Furniture, Joint, OrientedBox, Part, Role, Solid, Twin};
 use paws_twin::validation::{Drive, JointCheck, Surroundings, Verdict, simulate, validate};
 use rand::SeedableRng;
@@ -306,7 +306,7 @@ fn one_thread_and_two_give_the_same_bytes_and_a_picture_that_parses() {
     let text = paws_twin::json::text(&one).unwrap();
     assert_eq!(text, paws_twin::json::text(&two).unwrap());
     assert_eq!(serde_json::from_str::<paws_twin::validation::Validation>(&text).unwrap(), one);
-    let svg = pictures::proof(&kitchen.furniture[0], &one.joints[0]);
+    let svg = drawings::proof(&kitchen.furniture[0], &one.joints[0]);
     assert!(svg.contains("recorded hand") && !svg.contains("NaN") && !svg.contains("inf"), "{svg}");
     let mut reader = quick_xml::Reader::from_str(&svg);
     while reader.read_event().unwrap() != quick_xml::events::Event::Eof {}

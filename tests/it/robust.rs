@@ -7,7 +7,7 @@ use std::time::Instant;
 use paws_twin::recording::Recording;
 use serde_json::{Value, json};
 
-use crate::common::{SMALL, copy, paws, stderr};
+use crate::common::{SMALL, copy, opened_and_closed, paws, stderr};
 
 fn data(folder: &str, name: &str) -> String {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(folder).join(name).display().to_string()
@@ -73,6 +73,100 @@ fn joints_of_the_wrong_shape_are_told_by_joint_and_field() {
         assert_eq!(out.status.code(), Some(code), "{file}: {message}");
         assert!(message.contains(words), "{file}: \"{words}\" is not in: {message}");
         assert_eq!(dir.path().join(file).exists(), code == 0, "{file}");
+    }
+}
+
+#[test]
+fn a_wrong_joint_among_right_ones_is_left_out_and_told() {
+    let dir = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(data("joints", "ok.json")).unwrap();
+    let good: Value = serde_json::from_str(&text).unwrap();
+    let third = |change: &dyn Fn(&mut Value)| {
+        let mut file = good.clone();
+        let mut joint = file["joints"][0].clone();
+        joint["id"] = json!("third");
+        for key in ["part_box", "base_box"] {
+            joint[key]["center"][0] = json!(3.0);
+        }
+        joint["origin"][0] = json!(2.7);
+        joint["handle"][0] = json!(3.25);
+        change(&mut joint);
+        file["joints"].as_array_mut().unwrap().push(joint);
+        std::fs::write(dir.path().join("j.json"), file.to_string()).unwrap();
+        paws(&["export", "j.json", "--out", "out", "--format", "urdf"], dir.path())
+    };
+    let out = third(&|_: &mut Value| {});
+    assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+    type Change<'a> = &'a dyn Fn(&mut Value);
+    let wrong: [(Change, &str); 6] = [
+        (&|j: &mut Value| j["axis"] = json!([0, 0, 0]), "third: not built: axis: has length 0.0000"),
+        (
+            &|j: &mut Value| j["range"] = json!([0, 5]),
+            "third: not built: range: opens by 5.0 rad, more than half a turn",
+        ),
+        (&|j: &mut Value| j["handle"][1] = json!(-0.9), "third: not built: handle: is 0.90 m before"),
+        (&|j: &mut Value| j["part_box"]["R"] = json!(1), "third: not built: part_box.R: the number 1 is given"),
+        (&|j: &mut Value| j["colour"] = json!("red"), "third: not built: the key \"colour\" is not known here"),
+        (&|j: &mut Value| j["id"] = json!("wall_door"), "wall_door: not built: id: is used twice"),
+    ];
+    for (change, words) in wrong {
+        let out = third(change);
+        assert_eq!(out.status.code(), Some(1), "{words}: {}", stderr(&out));
+        assert!(stderr(&out).contains(words), "{words}: {}", stderr(&out));
+        let twin: Value =
+            serde_json::from_str(&std::fs::read_to_string(dir.path().join("out/twin.json")).unwrap()).unwrap();
+        assert_eq!(twin["furniture"].as_array().unwrap().len(), 2, "{words}");
+    }
+    // Of two joints one is half.
+    for (key, value, words) in [
+        ("range", json!([0, 5]), "joint wall_door: range: opens by 5.0 rad, more than half a turn"),
+        ("handle", json!([0.25, -0.9, 1.35]), "joint wall_door: handle: is 0.90 m before the part's front"),
+    ] {
+        let mut file = good.clone();
+        file["joints"][0][key] = value;
+        std::fs::write(dir.path().join("j.json"), file.to_string()).unwrap();
+        let out = paws(&["export", "j.json", "--out", "none"], dir.path());
+        assert_eq!(out.status.code(), Some(2), "{}", stderr(&out));
+        assert!(stderr(&out).contains(words), "{}", stderr(&out));
+    }
+    let mut file = good.clone();
+    file["joints"][1]["range"] = json!([-3, 0]);
+    std::fs::write(dir.path().join("j.json"), file.to_string()).unwrap();
+    let out = paws(&["export", "j.json", "--out", "none"], dir.path());
+    assert!(stderr(&out).contains("opens by 3.00 m, and what slides is 0.45 m long"), "{}", stderr(&out));
+    std::fs::write(dir.path().join("j.json"), "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n")
+        .unwrap();
+    let out = paws(&["export", "j.json", "--out", "none"], dir.path());
+    assert!(out.status.code() == Some(2) && stderr(&out).contains("Git LFS pointer"), "{}", stderr(&out));
+}
+
+#[test]
+fn answers_in_another_frame_get_no_scores() {
+    let dir = recording(|_| {});
+    let text = std::fs::read_to_string(dir.path().join("rec/ground_truth.json")).unwrap();
+    let truth: Value = serde_json::from_str(&text).unwrap();
+    let rows = |shift: f64| -> Vec<Value> {
+        let joint = |clip: &Value| truth["joints"].as_array()?.iter().find(|j| j["id"] == clip["joint"]).cloned();
+        let row = |clip: &Value| {
+            let joint = joint(clip)?;
+            let mut origin = joint["origin"].clone();
+            origin[0] = json!(origin[0].as_f64()? + shift);
+            origin[1] = json!(origin[1].as_f64()? + shift);
+            Some(json!({"recording": "rec", "clip": clip["clip"], "type": joint["type"], "axis": joint["axis"],
+                "origin": origin}))
+        };
+        truth["clips"].as_array().unwrap().iter().filter_map(row).collect()
+    };
+    for (shift, code, words) in [
+        (0.0, 0, ""),
+        (0.3, 0, ""),
+        (20.0, 2, "predictions and truth disagree on the unit (metres) or the world frame"),
+        (1e200, 2, "from the world's origin, farther than anything on Earth"),
+    ] {
+        std::fs::write(dir.path().join("p.json"), json!({"predictions": rows(shift)}).to_string()).unwrap();
+        let out = paws(&["evaluate", "p.json", "rec"], dir.path());
+        assert_eq!(out.status.code(), Some(code), "{shift}: {}", stderr(&out));
+        assert!(stderr(&out).contains(words) && stderr(&out).len() < 400, "{shift}: {}", stderr(&out));
     }
 }
 
@@ -198,6 +292,21 @@ fn times_increase_and_numbers_do_not_overflow() {
     let dir = recording(|r| {
         edit(&r.join("hands.json"), |v| v["frames"][0]["hands"][0]["joints_world"][4][0] = json!(1e200));
     });
+    let read = Recording::open(&dir.path().join("rec")).unwrap();
+    let whole = Recording::open(SMALL.path()).unwrap();
+    assert_eq!(read.hands.len() + 1, whole.hands.len());
+    let note = read.left_out.notes.first().unwrap();
+    assert!(note.contains("1 of ") && note.contains("a fingertip is not finite or overflows"), "{note}");
+    // Where most of them do, something went wrong with all.
+    let dir = recording(|r| {
+        edit(&r.join("hands.json"), |v| {
+            for frame in v["frames"].as_array_mut().unwrap() {
+                for hand in frame["hands"].as_array_mut().unwrap() {
+                    hand["joints_world"][4][0] = json!(1e200);
+                }
+            }
+        });
+    });
     assert!(faults(dir.path()).contains("a fingertip is not finite or overflows"), "{}", faults(dir.path()));
 }
 
@@ -237,13 +346,7 @@ fn interactions_are_found_where_nobody_told_them() {
     let out = paws(&["twin", "rec", "--no-textures", "--out", "t"], dir.path());
     assert!(matches!(out.status.code(), Some(0 | 1)), "{}", stderr(&out));
     assert!(stderr(&out).contains("interactions by the hands"), "{}", stderr(&out));
-    let found: Value =
-        serde_json::from_str(&std::fs::read_to_string(dir.path().join("t/articulations.json")).unwrap()).unwrap();
-    // What is found in error has no answer; what is right opens and closes one part.
-    let answered: Vec<&Value> =
-        found["clips"].as_array().unwrap().iter().filter(|c| !c["outcome"]["found"].is_null()).collect();
-    let verbs: Vec<&str> = answered.iter().filter_map(|c| c["verb"].as_str()).collect();
-    assert_eq!(verbs, ["open", "close"], "{found}");
+    let found = opened_and_closed(&dir.path().join("t"));
     assert_eq!(found["joints"].as_array().unwrap().len(), 1, "{found}");
 }
 

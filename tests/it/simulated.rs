@@ -135,9 +135,10 @@ mod tests {
 
     #[test]
     fn it_errs_as_often_as_it_is_told_to() {
+        let reasoning = paws_twin::config::Reasoning::default();
         let share = |errors: Errors| {
-            let wrong =
-                (0..400).filter(|&seed| words(JointKind::Revolute, Some(2), 5, errors, seed).log_odds(0.9) < 0.0);
+            let wrong = (0..400)
+                .filter(|&seed| words(JointKind::Revolute, Some(2), 5, errors, seed).log_odds(&reasoning) < 0.0);
             wrong.count() as f64 / 400.0
         };
         assert!(share(Errors::Random { kind: 0.0, line: 0.0 }) < 0.01);

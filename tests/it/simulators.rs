@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use paws_twin::synth::{Options, Tier};
+use paws_twin::synth::{SynthOptions, Tier};
 
 use crate::common::{optional_data, paws, record, required, skipped, stderr};
 
@@ -64,7 +64,7 @@ fn twins_are_ready_for_every_simulator() {
         [(21, Tier::Clean, 5), (22, Tier::Realistic, 5), (23, Tier::Clean, 1), (24, Tier::Hard, 6)]
     {
         let name = format!("kitchen_{seed}");
-        record(&Options { seed, tier, width: 240, parts }, &dir.path().join(&name));
+        record(&SynthOptions { seed, tier, width: 240, parts }, &dir.path().join(&name));
         folders.push((name.clone(), dir.path().join(name)));
     }
     if let Some(root) = optional_data("recordings") {

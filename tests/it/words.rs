@@ -11,19 +11,19 @@ use std::time::{Duration, Instant};
 
 use paws_twin::articulation::{Articulation, JointKind};
 use paws_twin::config::Config;
-use paws_twin::evaluation::{Report, Rule, Truth, evaluate};
+use paws_twin::evaluation::{EvaluationReport, Rule, Truth, evaluate};
 use paws_twin::fitting;
 use paws_twin::geometry::segments::Lsd;
 use paws_twin::pipeline;
 use paws_twin::reasoning::Reasoner;
+use paws_twin::reasoning::asking::Asking;
 use paws_twin::reasoning::heuristic::Geometric;
 use paws_twin::reasoning::prompts::Prompts;
-use paws_twin::reasoning::words::Asking;
 use paws_twin::recording::Recording;
 use paws_twin::report::files::predictions;
-use paws_twin::synth::{Options, Tier};
-use paws_twin::vlm::server::{Key, Limits, Server};
-use paws_twin::vlm::{Model, Picture, Question, Sampling, Usage};
+use paws_twin::synth::{SynthOptions, Tier};
+use paws_twin::vlm::server::{ApiKey, RequestLimits, Server};
+use paws_twin::vlm::{EncodedPicture, LanguageModel, PictureQuestion, Sampling, Usage};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -31,24 +31,24 @@ use crate::common::{SMALL, copy, python, record, stderr, tree};
 use crate::simulated::{Errors, Simulated};
 
 /// A request as the server got it.
-struct Got {
+pub struct Got {
     head: String,
     body: Value,
 }
 
 impl Got {
-    fn text(&self) -> &str {
+    pub fn text(&self) -> &str {
         self.body["messages"][0]["content"][0]["text"].as_str().unwrap()
     }
 
-    fn pictures(&self) -> Vec<&str> {
+    pub fn pictures(&self) -> Vec<&str> {
         let content = self.body["messages"][0]["content"].as_array().unwrap();
         content[1..].iter().map(|p| p["image_url"]["url"].as_str().unwrap()).collect()
     }
 }
 
 /// What the server does with a request.
-struct Reply {
+pub struct Reply {
     status: u16,
     headers: String,
     body: Vec<u8>,
@@ -62,7 +62,7 @@ fn reply(status: u16, headers: &str, body: impl Into<Vec<u8>>) -> Reply {
 }
 
 /// The reply of a chat completion.
-fn says(answer: &str) -> Reply {
+pub fn says(answer: &str) -> Reply {
     let body = json!({"choices": [{"message": {"role": "assistant", "content": answer}, "finish_reason": "stop"}]});
     reply(200, "content-type: application/json\r\n", body.to_string())
 }
@@ -70,16 +70,16 @@ fn says(answer: &str) -> Reply {
 type Behaviour = dyn Fn(usize, &Got) -> Reply + Send + Sync;
 
 /// A server on this machine; it stops when dropped.
-struct Mock {
+pub struct Mock {
     address: SocketAddr,
-    got: Arc<Mutex<Vec<Got>>>,
+    pub got: Arc<Mutex<Vec<Got>>>,
     busiest: Arc<AtomicUsize>,
     stop: Arc<AtomicBool>,
     thread: Option<std::thread::JoinHandle<()>>,
 }
 
 impl Mock {
-    fn new(behaviour: impl Fn(usize, &Got) -> Reply + Send + Sync + 'static) -> Self {
+    pub fn new(behaviour: impl Fn(usize, &Got) -> Reply + Send + Sync + 'static) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap();
         let (got, busiest, stop) =
@@ -108,7 +108,7 @@ impl Mock {
         Self { address, got, busiest, stop, thread: Some(thread) }
     }
 
-    fn url(&self) -> String {
+    pub fn url(&self) -> String {
         format!("http://{}", self.address)
     }
 
@@ -171,18 +171,18 @@ fn serve(mut stream: TcpStream, got: &Mutex<Vec<Got>>, behaviour: &Behaviour, do
     let _ = stream.write_all(head.as_bytes()).and_then(|()| stream.write_all(&reply.body));
 }
 
-fn question(text: &str) -> Question {
-    Question {
+fn question(text: &str) -> PictureQuestion {
+    PictureQuestion {
         purpose: "clip/name".to_owned(),
         text: text.to_owned(),
-        pictures: vec![Picture { bytes: vec![0xff, 0xd8, 0xff], mime: "image/jpeg", size: [8, 8] }],
+        pictures: vec![EncodedPicture { bytes: vec![0xff, 0xd8, 0xff], mime: "image/jpeg", size: [8, 8] }],
         sampling: Sampling { temperature: 0.5, top_p: 0.3, max_tokens: 300 },
     }
 }
 
 /// Limits of an impatient test.
-fn limits() -> Limits {
-    Limits {
+fn limits() -> RequestLimits {
+    RequestLimits {
         connect: Duration::from_secs(1),
         request: Duration::from_millis(400),
         tries: 3,
@@ -240,7 +240,7 @@ fn a_passing_fault_passes_and_a_wrong_content_type_is_forgiven() {
 fn a_refused_key_ends_the_run_and_is_not_repeated() {
     const SECRET: &str = "sk-0123456789abcdef";
     let mock = Mock::new(|_, got| reply(401, "", format!("wrong key: {}", got.head)));
-    let key = Key::new("MY_KEY", SECRET).unwrap();
+    let key = ApiKey::new("MY_KEY", SECRET).unwrap();
     let server = Server::new(&mock.url(), "m", Some(key), limits()).unwrap();
     let error = server.ask(&question("which?")).unwrap_err().to_string();
     assert!(error.contains("401") && error.contains("MY_KEY") && !error.contains(SECRET), "{error}");
@@ -249,7 +249,7 @@ fn a_refused_key_ends_the_run_and_is_not_repeated() {
     assert!(server.ask(&question("which?")).unwrap_err().to_string().contains("--vlm-key-env"));
     // A server that parrots the key in its answer.
     let mock = Mock::new(|_, got| says(&format!("drawer:translation {}", got.head.replace("\r\n", " "))));
-    let server = Server::new(&mock.url(), "m", Some(Key::new("MY_KEY", SECRET).unwrap()), limits()).unwrap();
+    let server = Server::new(&mock.url(), "m", Some(ApiKey::new("MY_KEY", SECRET).unwrap()), limits()).unwrap();
     let answer = server.ask(&question("which?")).unwrap().unwrap();
     assert!(answer.contains("***") && !answer.contains(SECRET), "{answer}");
 }
@@ -257,7 +257,7 @@ fn a_refused_key_ends_the_run_and_is_not_repeated() {
 #[test]
 fn no_more_requests_than_allowed_whatever_fails_and_however_many_ask() {
     let mock = Mock::new(|_, _| reply(500, "", ""));
-    let server = Server::new(&mock.url(), "m", None, Limits { max_requests: 7, ..limits() }).unwrap();
+    let server = Server::new(&mock.url(), "m", None, RequestLimits { max_requests: 7, ..limits() }).unwrap();
     std::thread::scope(|scope| {
         for _ in 0..4 {
             scope.spawn(|| {
@@ -276,7 +276,8 @@ fn no_more_requests_than_allowed_whatever_fails_and_however_many_ask() {
 #[test]
 fn no_more_at_the_same_time_than_allowed() {
     let mock = Mock::new(|_, _| Reply { delay: Duration::from_millis(20), ..says("none") });
-    let server = Server::new(&mock.url(), "m", None, Limits { request: Duration::from_secs(5), ..limits() }).unwrap();
+    let server =
+        Server::new(&mock.url(), "m", None, RequestLimits { request: Duration::from_secs(5), ..limits() }).unwrap();
     std::thread::scope(|scope| {
         for _ in 0..6 {
             scope.spawn(|| {
@@ -410,7 +411,7 @@ fn what_cannot_be_asked_is_told_at_once() {
         (vec!["--vlm-url", &url], "--vlm-model"),
         (vec!["--vlm-url", "127.0.0.1", "--vlm-model", "m"], "http://"),
         (vec!["--vlm-model", "m"], "--vlm-url"),
-        (vec!["--vlm-model", "m", "--replay", "--templates", "rec"], "axis_choice.txt"),
+        (vec!["--vlm-model", "m", "--kept-answers", "--templates", "rec"], "axis_choice.txt"),
         (vec!["--vlm-model", "m", "--replay", "--answers", "t/answers"], "--answers"),
     ];
     if cfg!(not(feature = "vlm-https")) {
@@ -472,20 +473,20 @@ fn a_real_server_answers_about_real_pictures() {
 /// A kitchen with short motions and vague narrations, where words count.
 static KITCHEN: LazyLock<TempDir> = LazyLock::new(|| {
     let dir = tempfile::tempdir().unwrap();
-    record(&Options { seed: 104, tier: Tier::Hard, width: 320, parts: 6 }, dir.path());
+    record(&SynthOptions { seed: 104, tier: Tier::Hard, width: 320, parts: 6 }, dir.path());
     dir
 });
 
 fn geometric() -> Geometric {
     let config = Config::default();
-    Geometric { reasoning: config.reasoning, inference: config.inference }
+    Geometric::of(&config)
 }
 
-fn report(reasoner: &dyn Reasoner) -> Report {
+fn report(reasoner: &dyn Reasoner) -> EvaluationReport {
     let config = Config::default();
     let recording = Recording::open(KITCHEN.path()).unwrap();
     let scene = pipeline::infer(&recording, &config, &Lsd, reasoner, &|_, _, _| {}).unwrap();
-    let twin = fitting::fit(&scene, &recording.up(), &config.fitting);
+    let twin = fitting::fit(&scene, &recording.up(), &config.fitting, &config.priors);
     evaluate(&predictions(&scene, &twin), &[Truth::read(KITCHEN.path()).unwrap()])
 }
 
@@ -500,7 +501,7 @@ fn joints() -> BTreeMap<String, Articulation> {
 #[test]
 fn a_model_that_is_wrong_does_not_sink_the_inference() {
     let geometric = geometric();
-    let shares = |report: &Report| report.rules.iter().find(|r| r.rule == Rule::UsdnetMaoSt).unwrap().micro;
+    let shares = |report: &EvaluationReport| report.rules.iter().find(|r| r.rule == Rule::UsdnetMaoSt).unwrap().micro;
     let alone = shares(&report(&geometric));
     eprintln!("geometry alone: M {:.2} MA {:.2} MAO {:.2}", alone.m, alone.ma, alone.mao);
     for (name, errors, loss) in [
@@ -518,11 +519,11 @@ fn a_model_that_is_wrong_does_not_sink_the_inference() {
 
 /// Answers from the picture's side of the question only: it keeps what it was asked.
 struct Listener {
-    asked: Mutex<Vec<Question>>,
+    asked: Mutex<Vec<PictureQuestion>>,
 }
 
-impl Model for Listener {
-    fn ask(&self, question: &Question) -> paws_twin::error::Result<Option<String>> {
+impl LanguageModel for Listener {
+    fn ask(&self, question: &PictureQuestion) -> paws_twin::error::Result<Option<String>> {
         self.asked.lock().unwrap().push(question.clone());
         Ok(Some("unknown".to_owned()))
     }
@@ -557,7 +558,7 @@ fn every_clip_is_asked_about_its_frames_and_the_lines_of_its_views() {
         assert_eq!((of(name, "motion_"), of(name, "summary")), (10, 1), "{name}");
         views += of(name, "axis_view_");
         let words = clip.words.as_ref().unwrap();
-        assert_eq!((words.unknown, words.log_odds(0.9)), (10, 0.0));
+        assert_eq!((words.unknown, words.log_odds(&Config::default().reasoning)), (10, 0.0));
     }
     assert!(views > 20, "{views} views with lines");
     for question in &asked {

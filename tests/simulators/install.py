@@ -4,7 +4,8 @@
     DIR/python/bin/python tests/simulators/matrix.py TWIN_DIR...
 
 About 2 GB and two minutes; what is there already, at the same versions, is kept, and the system is left alone. What
-cannot be installed is reported as "cannot run: reason"; with --require that is exit code 1.
+cannot be installed is reported as "cannot run: reason"; with --require that is exit code 1. What is optional
+(requirements-optional.txt) is "left out: reason" and no failure: its wheels are not there for every machine.
 """
 
 import argparse
@@ -27,10 +28,17 @@ def run(*command, cwd=None):
     return result.stdout
 
 
+def pip_of(folder):
+    """The command that installs into an environment."""
+    return [folder / "bin/python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+
+
 def environment(folder, requirements):
     """A virtual environment; one package that fails does not take the others with it."""
     run(sys.executable, "-m", "venv", "--clear", folder)
-    pip = [folder / "bin/python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    # What was added to it is gone with the old one.
+    (folder.parent / "optional.installed").unlink(missing_ok=True)
+    pip = pip_of(folder)
     try:
         run(*pip, "-r", requirements)
     except RuntimeError:
@@ -43,6 +51,11 @@ def environment(folder, requirements):
                 failed.append(f"{line} ({error})")
         if failed:
             raise RuntimeError("; ".join(failed)) from None
+
+
+def optional(folder, requirements):
+    """What few machines may lack: added to the environment of the drivers."""
+    run(*pip_of(folder.parent / "python"), "-r", requirements)
 
 
 def node(folder, package):
@@ -76,6 +89,7 @@ def debian(folder, _):
 
 STEPS = (
     ("python", environment, HERE / "requirements.txt"),
+    ("optional", optional, HERE / "requirements-optional.txt"),
     ("usd", environment, HERE / "requirements-usd.txt"),
     ("node", node, HERE / "package.json"),
     ("debian", debian, HERE / "install.py"),
@@ -96,8 +110,9 @@ def main():
         try:
             install(folder, wanted)
         except (RuntimeError, OSError) as error:
-            print(f"{name}: cannot run: {error}")
-            failed = True
+            is_needed = name != "optional"
+            print(f"{name}: {'cannot run' if is_needed else 'left out'}: {error}")
+            failed = failed or is_needed
         else:
             stamp.write_text(wanted.read_text())
             print(f"{name}: installed")

@@ -521,6 +521,7 @@ class Viewer {
     this.selected = null;
     this.hot = null;
     this.userMoved = false;
+    this.shot = null;
 
     addHiddenBoxes(model);
     const { joints, meshes } = findJoints(model);
@@ -642,7 +643,7 @@ class Viewer {
       root.classList.remove("pv-is-lost");
       this.draw();
     });
-    stage.append(canvas, hint, home, this.buildSwitches(), lost);
+    stage.append(canvas, this.buildShot(), hint, home, this.buildSwitches(), lost);
 
     const panel = element("div", "pv-panel");
     const head = element("div", "pv-head");
@@ -668,6 +669,88 @@ class Viewer {
     root.append(stage, panel);
     this.stage = stage;
     this.panel = panel;
+  }
+
+  /** A recorded frame before the scene as its camera sees it, and what wipes it away. */
+  buildShot() {
+    const layer = element("div", "pv-shot");
+    const picture = element("img", "pv-picture");
+    picture.alt = "Recorded frame";
+    const wipe = element("input", "pv-slider pv-wipe");
+    wipe.type = "range";
+    wipe.min = "0";
+    wipe.max = "1";
+    wipe.step = "0.01";
+    wipe.value = "0.5";
+    wipe.title = "Left: the recorded frame. Right: the twin.";
+    wipe.setAttribute("aria-label", "How much of the recorded frame is shown");
+    const refresh = () => {
+      picture.style.clipPath = `inset(0 ${100 - 100 * Number(wipe.value)}% 0 0)`;
+      wipe.style.setProperty("--pv-filled", `${100 * Number(wipe.value)}%`);
+    };
+    wipe.addEventListener("input", refresh);
+    refresh();
+    layer.append(picture, wipe);
+    this.picture = picture;
+    return layer;
+  }
+
+  /**
+   * Looks from where a frame was taken, the joints as they were then, the frame over the left half of the view. `pose` is the
+   * camera's place in the scene (16 numbers, column by column; it looks along its -Z), the rest its image and its lens in pixels.
+   */
+  lookFrom(shot) {
+    this.shot = shot;
+    this.userMoved = true;
+    this.picture.src = shot.src;
+    this.root.classList.add("pv-in-shot");
+    this.select(null);
+    for (const joint of this.joints) {
+      const value = shot.openings?.[joint.id] ?? 0;
+      joint.tween = null;
+      if (!joint.fixed) joint.set((value - joint.from) / (joint.to - joint.from));
+      this.refreshRow(joint);
+    }
+    this.refreshButtons();
+    this.placeShot();
+    this.invalidate();
+  }
+
+  /** The frame is shown as large as it fits; the rest of the view is what its camera would have seen around it. */
+  placeShot() {
+    const { shot, camera, stage, picture } = this;
+    const [width, height] = [Math.max(stage.clientWidth, 1), Math.max(stage.clientHeight, 1)];
+    const scale = Math.min(width / shot.width, height / shot.height);
+    const [shownX, shownY] = [(shot.width * scale) / width, (shot.height * scale) / height];
+    Object.assign(picture.style, {
+      left: `${50 * (1 - shownX)}%`,
+      top: `${50 * (1 - shownY)}%`,
+      width: `${100 * shownX}%`,
+      height: `${100 * shownY}%`,
+    });
+    new Matrix4().fromArray(shot.pose).decompose(camera.position, camera.quaternion, camera.scale);
+    camera.updateMatrixWorld();
+    camera.updateProjectionMatrix();
+    // Pixels are counted from the middle of the first one; rows go down.
+    const lens = camera.projectionMatrix.elements;
+    lens[0] = ((2 * shot.fx) / shot.width) * shownX;
+    lens[5] = ((2 * shot.fy) / shot.height) * shownY;
+    lens[8] = (1 - (2 * (shot.cx + 0.5)) / shot.width) * shownX;
+    lens[9] = ((2 * (shot.cy + 0.5)) / shot.height - 1) * shownY;
+    camera.projectionMatrixInverse.copy(camera.projectionMatrix).invert();
+  }
+
+  /** Takes the frame away; the view stays, upright, and can be turned about what is before it. */
+  leaveShot() {
+    if (!this.shot) return;
+    this.shot = null;
+    this.root.classList.remove("pv-in-shot");
+    const { camera, controls } = this;
+    const ahead = camera.getWorldDirection(new Vector3());
+    const distance = Math.max(this.centre.clone().sub(camera.position).dot(ahead), this.radius * 0.5);
+    camera.updateProjectionMatrix();
+    controls.target.copy(camera.position).addScaledVector(ahead, distance);
+    this.invalidate();
   }
 
   /** What is shown of the scene; a scene that is not made of our boxes has nothing to choose from. */
@@ -766,7 +849,10 @@ class Viewer {
     controls.enableDamping = true;
     controls.dampingFactor = 0.12;
     controls.maxPolarAngle = Math.PI * 0.53;
-    controls.addEventListener("start", () => (this.userMoved = true));
+    controls.addEventListener("start", () => {
+      this.userMoved = true;
+      this.leaveShot();
+    });
     controls.addEventListener("change", () => this.invalidate());
     this.controls = controls;
     // A finger that moves up or down scrolls the page, or a phone could not get past the canvas.
@@ -888,6 +974,7 @@ class Viewer {
   }
 
   frameCamera() {
+    this.leaveShot();
     const { target, distance } = fitCamera(this.camera, this.points, this.direction, this.centre);
     this.controls.target.copy(target);
     this.controls.minDistance = this.radius * 0.25;
@@ -905,6 +992,7 @@ class Viewer {
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
     if (!this.userMoved) this.frameCamera();
+    if (this.shot) this.placeShot();
     // At once and not in the next frame: resizing clears the canvas, which would flicker.
     this.draw();
   }
@@ -934,7 +1022,8 @@ class Viewer {
     requestAnimationFrame((now) => {
       this.queued = false;
       const moving = this.step(now);
-      this.controls.update();
+      // The controls know no camera that is held askew, as a head is.
+      if (!this.shot) this.controls.update();
       this.draw();
       if (moving) this.invalidate();
     });
@@ -966,6 +1055,10 @@ class Viewer {
       show: (layer, on) => this.setLayer(layer, on),
       /** Which layers are shown. */
       shown: () => ({ ...this.show }),
+      /** Looks from where a frame was taken: `src`, `pose`, `width`, `height`, `fx`, `fy`, `cx`, `cy`, `openings`. */
+      lookFrom: (shot) => this.lookFrom(shot),
+      /** Takes the frame away again. */
+      leave: () => this.leaveShot(),
       openAll: () => this.moveAll(true),
       closeAll: () => this.moveAll(false),
       /** Where a joint's part is now: the middle of its bounds in the world. For tests. */

@@ -8,6 +8,11 @@ export const STYLE = `
 .pv-stage canvas { display: block; width: 100%; height: 100%; object-fit: contain; cursor: grab; outline: none; }
 .pv-stage canvas:active { cursor: grabbing; }
 .pv-hint { position: absolute; left: 14px; bottom: 11px; right: 14px; font-size: 12px; color: #6b7280; pointer-events: none; }
+.pv-shot { display: none; position: absolute; inset: 0; pointer-events: none; }
+.pv-in-shot .pv-shot { display: block; }
+.pv-in-shot .pv-hint { display: none; }
+.pv-picture { position: absolute; display: block; }
+.pv .pv-wipe { position: absolute; left: 12%; width: 76%; bottom: 10px; pointer-events: auto; }
 .pv-home { position: absolute; left: 12px; top: 12px; }
 .pv-switches { position: absolute; right: 12px; top: 12px; display: flex; flex-wrap: wrap; justify-content: flex-end; gap: 6px; max-width: 70%; }
 .pv-switch[aria-pressed="true"] { background: #1d4ed8; border-color: #1d4ed8; color: #fff; }
@@ -58,7 +63,7 @@ export const STYLE = `
   .pv-hint { font-size: 11.5px; }
 }
 @media print {
-  .pv-panel, .pv-hint, .pv-home, .pv-switches { display: none; }
+  .pv-panel, .pv-hint, .pv-home, .pv-switches, .pv .pv-wipe { display: none; }
   .pv { break-inside: avoid; background: none; border: 0; }
   .pv-stage { height: auto; }
   .pv-stage canvas { height: auto; max-height: 125mm; }

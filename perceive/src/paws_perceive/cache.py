@@ -4,6 +4,7 @@ A stream is a folder `STREAM-KEY`; the key is a hash of the adapter, its weights
 written in parts, each under another name first and then renamed, so that a run that is killed leaves whole parts only.
 """
 
+import contextlib
 import errno
 import hashlib
 import json
@@ -35,18 +36,19 @@ def key_of(facts):
 
 
 def write_whole(path, text):
-    """Writes a file that is the old one or the new one, never half of it."""
+    """Writes a file, of text or of bytes, that is the old one or the new one, never half of it."""
     path = pathlib.Path(path)
     beside = path.with_name(f".{path.name}.partial-{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with open(beside, "w", encoding="utf-8") as file:
-            file.write(text)
+        with open(beside, "wb") as file:
+            file.write(text.encode() if isinstance(text, str) else text)
             file.flush()
             os.fsync(file.fileno())
         os.replace(beside, path)
     except OSError as error:
-        beside.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            beside.unlink(missing_ok=True)
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
             raise Failure(
                 f"{path}: the disk is full; what is finished stays in the cache: make room, or name another folder with "

@@ -1,4 +1,4 @@
-"""OpenEXR, one channel of 32-bit floats, not packed: what `paws import` reads depth from."""
+"""OpenEXR, one channel of 32-bit floats, not packed: what `paws import` reads depth from, and what the cache holds."""
 
 import struct
 
@@ -34,3 +34,17 @@ def encoded(values):
     offsets = struct.pack(f"<{rows}Q", *(first + length * row for row in range(rows)))
     lines = b"".join(struct.pack("<ii", row, 4 * columns) + values[row].tobytes() for row in range(rows))
     return head + offsets + lines
+
+
+def decoded(data):
+    """The values of a file as `encoded` writes it, or `None` where it is not whole."""
+    window, last = b"dataWindow\0box2i\0", b"screenWindowWidth\0float\0"
+    try:
+        _, _, right, bottom = struct.unpack_from("<4i", data, data.index(window) + len(window) + 4)
+        # Behind the last attribute: its length and value, and the end of the head.
+        table = data.index(last) + len(last) + 4 + 4 + 1
+        rows, columns = bottom + 1, right + 1
+        offsets = np.frombuffer(data, "<u8", rows, table)
+        return np.stack([np.frombuffer(data, "<f4", columns, int(offset) + 8) for offset in offsets])
+    except (ValueError, struct.error):
+        return None

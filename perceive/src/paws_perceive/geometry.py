@@ -246,14 +246,23 @@ def place(shape, pixels, camera, palm_m, palm_std, depth=None):
     return Placed(rays * joints[:, 2:], along, max(0.5 * rest, 1.0) * z / camera.fx, "depth")
 
 
-def to_world(points, position, rotation_wxyz):
-    """Points of the camera in the world."""
+def turn_of(rotation_wxyz):
+    """The 3 x 3 rotation of a quaternion."""
     w, x, y, z = np.array(rotation_wxyz) / np.linalg.norm(rotation_wxyz)
-    turn = np.array(
+    return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
             [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
             [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
         ]
     )
-    return points @ turn.T + position
+
+
+def to_world(points, position, rotation_wxyz):
+    """Points of the camera in the world."""
+    return points @ turn_of(rotation_wxyz).T + position
+
+
+def in_camera(points, position, rotation_wxyz):
+    """Points of the world in the camera."""
+    return (points - position) @ turn_of(rotation_wxyz)

@@ -4,7 +4,7 @@ import hashlib
 
 import numpy as np
 
-from . import Failure, adapters, tracks
+from . import Failure, adapters, batches, tracks
 from .cache import Stream, digest_of
 from .geometry import anchor_depths, measured_palm, person_size, place, to_world
 from .recording import Recording, add_hands, add_origin
@@ -15,6 +15,9 @@ CROP = 0.75
 SAME = 0.35
 # Hands that one picture alone shows are no hands, unless the network is as sure as this and more than one view shows it.
 ALONE = 0.8
+# A hand in more frames than this share, whose place in the picture varies by less than this share of the picture's width, rests, or is
+# no hand but a thing that looks like one.
+ALWAYS, STILL = 0.9, 0.05
 
 
 def views(width, height):
@@ -133,14 +136,76 @@ def _is_doubtful(track, kept, placed):
     return one and (kept[number][i]["score"] < ALONE or kept[number][i]["seen"] < 2)
 
 
-def run(folder, cache, device="cpu", weights=None, redo=False, say=print, progress=lambda what, done, count: None):
+def still(frames, width):
+    """Whether a hand is in nearly every frame and hardly moves in the picture. `frames`: detections by frame."""
+    seen = [detections for detections in frames if detections]
+    if not frames or len(seen) < ALWAYS * len(frames) or len(frames) < 10:
+        return False
+    # The one of several that is nearest to where hands are in most frames.
+    usual = np.median([tracks.middle(d) for detections in seen for d in detections], axis=0)
+    nearest = [min((float(np.linalg.norm(tracks.middle(d) - usual)) for d in detections)) for detections in seen]
+    return float(np.quantile(nearest, 0.9)) < STILL * width
+
+
+def warn(say, found, width, broken):
+    """Says which images cannot be read, and that what looks like a hand may be none. `broken`: their paths, `None` without an image."""
+    if broken:
+        names = ", ".join(str(p) for p in broken[:3] if p)
+        say(f"{len(broken)} images cannot be read, and show no hand therefore" + (f": {names}" if names else ""))
+    if still(found, width):
+        say(
+            "hands: one is in nearly every frame and hardly moves in the picture: a hand that rests, or a thing that looks like one; where "
+            "hands open nothing, no interaction is found: look at a frame or two, and crop or cover what is no hand at work"
+        )
+
+
+def written(folder, about, digests, hands, numbers, say):
+    """Notes in the recording where its hands come from, and says how many they are. `numbers`: of frames, and the palm's mean and spread."""
+    count, palm_m, palm_std = numbers
+    by_depth = sum(h["distance_by"] == "depth" for f in hands for h in f["hands"])
+    total = sum(len(f["hands"]) for f in hands)
+    add_origin(
+        folder,
+        {
+            "stream": "hands",
+            "adapter": about.name,
+            "licence": about.licence,
+            "weights": digests,
+            "gives": "21 joints, world frame, metres",
+            "frames_with_hands": len(hands),
+            "hands": total,
+            "distance_by_depth": by_depth,
+            "palm_m": round(palm_m, 4),
+            "palm_relative_std": round(palm_std, 4),
+        },
+    )
+    say(
+        f"hands: {total} in {len(hands)} of {count} frames; distance from depth in {by_depth}, from the hand's size in "
+        f"{total - by_depth}; palm {100 * palm_m:.1f} cm to {100 * palm_std:.0f} %"
+    )
+
+
+def run(
+    folder,
+    cache,
+    device="cpu",
+    weights=None,
+    redo=False,
+    say=print,
+    progress=lambda what, done, count: None,
+    by=None,
+    accepted=(),
+):
     """Finds the hands of a recording and writes `hands.json` into it. Returns how many frames have one."""
     recording = Recording(folder)
     paths = [recording.image_path(frame) for frame in recording.frames]
     if not any(paths):
         raise Failure(f"{recording.folder}: has no colour image that `cameras.json` lists; hands are found in images")
-    module = adapters.of("hands")
+    module = adapters.of("hands", by)
     about = module.ABOUT
+    if about.asks:
+        adapters.accepted(about, accepted)
+    digests = module.digests(weights) if hasattr(module, "digests") else about.weights
     network = None
 
     def loaded():
@@ -153,6 +218,12 @@ def run(folder, cache, device="cpu", weights=None, redo=False, say=print, progre
     # Broken weights are told before anything is computed, and whether or not the cache has it all.
     loaded()
 
+    def detected(picture, squares):
+        try:
+            return detect(loaded(), picture, squares)
+        except batches.TooLarge as error:
+            raise Failure(batches.smaller("hands", picture.shape[1], picture.shape[0])) from error
+
     def image(number):
         read = cv2.imread(str(paths[number])) if paths[number] else None
         return None if read is None else read[:, :, ::-1]
@@ -161,7 +232,7 @@ def run(folder, cache, device="cpu", weights=None, redo=False, say=print, progre
     facts = {
         "adapter": about.name,
         "version": about.version,
-        "weights": about.weights,
+        "weights": digests,
         "options": {"crop": CROP, "same": SAME},
         "images": upstream,
     }
@@ -175,7 +246,7 @@ def run(folder, cache, device="cpu", weights=None, redo=False, say=print, progre
         if picture is None:
             broken.add(number)
             return []
-        return detect(loaded(), picture, views(picture.shape[1], picture.shape[0]))
+        return detected(picture, views(picture.shape[1], picture.shape[0]))
 
     count = len(paths)
     found = first.run(count, look, lambda done, all_: progress("hands", done, all_))
@@ -190,7 +261,7 @@ def run(folder, cache, device="cpu", weights=None, redo=False, say=print, progre
         if picture is None:
             return []
         squares = [(int(u - h), int(v - h), max(int(2 * h), 32)) for u, v, h in wanted[number]]
-        return detect(loaded(), picture, squares)
+        return detected(picture, squares)
 
     again = second.run(count, look_again, lambda done, all_: progress("hands missed", done, all_))
     found = [joined(a, b) for a, b in zip(found, again)]
@@ -201,29 +272,8 @@ def run(folder, cache, device="cpu", weights=None, redo=False, say=print, progre
         return None if read is None or read.ndim != 2 else read.astype(np.float64) / 1000
 
     hands, palm_m, palm_std = lifted(recording, found, read_depth)
-    if broken:
-        names = ", ".join(str(paths[n]) for n in sorted(broken)[:3] if paths[n])
-        say(f"{len(broken)} images cannot be read, and show no hand therefore" + (f": {names}" if names else ""))
+    width = 2 * recording.camera.cx + 1
+    warn(say, found, width, [paths[n] for n in sorted(broken)])
     add_hands(folder, hands)
-    by_depth = sum(h["distance_by"] == "depth" for f in hands for h in f["hands"])
-    total = sum(len(f["hands"]) for f in hands)
-    add_origin(
-        folder,
-        {
-            "stream": "hands",
-            "adapter": about.name,
-            "licence": about.licence,
-            "weights": about.weights,
-            "gives": "21 joints, world frame, metres",
-            "frames_with_hands": len(hands),
-            "hands": total,
-            "distance_by_depth": by_depth,
-            "palm_m": round(palm_m, 4),
-            "palm_relative_std": round(palm_std, 4),
-        },
-    )
-    say(
-        f"hands: {total} in {len(hands)} of {count} frames; distance from depth in {by_depth}, from the hand's size in "
-        f"{total - by_depth}; palm {100 * palm_m:.1f} cm to {100 * palm_std:.0f} %"
-    )
+    written(folder, about, digests, hands, (count, palm_m, palm_std), say)
     return len(hands)

@@ -27,6 +27,8 @@ class Recording:
         cameras = read_json(path)
         try:
             self.camera = Camera(*(float(cameras[k]) for k in ("fx", "fy", "cx", "cy")))
+            # Pixels; 0 where nobody says it.
+            self.width = int(cameras.get("width", 0))
             self.frames = [
                 {
                     "frame": int(f["frame"]),
@@ -53,6 +55,36 @@ class Recording:
         return path if path.is_file() else None
 
 
+def chosen(recording, numbers=None):
+    """The frames of a recording whose numbers are given; all where none are."""
+    if numbers is None:
+        return recording.frames
+    wanted = set(numbers)
+    return [frame for frame in recording.frames if frame["frame"] in wanted]
+
+
+def numbers_of(path):
+    """Numbers of frames from a JSON file: a list of them, or what `paws frames --json` prints."""
+    held = read_json(path)
+    held = held.get("frames") if isinstance(held, dict) else held
+    numbers = [f.get("frame") if isinstance(f, dict) else f for f in held] if isinstance(held, list) else [None]
+    if not all(isinstance(n, int) and not isinstance(n, bool) for n in numbers):
+        raise Failure(f"{path}: is no list of frames: `paws frames RECORDING --json` writes one")
+    return numbers
+
+
+def read_hands(folder):
+    """Hands by number of the frame: for each its 21 joints, world, metres. Empty where there are none, or tips alone."""
+    path = pathlib.Path(folder) / "hands.json"
+    if not path.is_file():
+        return {}
+    try:
+        frames = read_json(path)["frames"]
+        return {int(f["frame"]): [h["joints_world"] for h in f["hands"] if len(h["joints_world"]) == 21] for f in frames}
+    except (KeyError, TypeError, ValueError) as error:
+        raise Failure(f"{path}: {error!r}: is no list of hands as docs/recording-format.md has it") from error
+
+
 def add_hands(folder, frames):
     """Writes `hands.json`."""
     text = json.dumps(
@@ -64,6 +96,15 @@ def add_hands(folder, frames):
         }
     )
     write_whole(pathlib.Path(folder) / "hands.json", text + "\n")
+
+
+def add_labels(folder, labels):
+    """Writes `labels.json`: class number to name. Without classes there is none."""
+    path = pathlib.Path(folder) / "labels.json"
+    if labels:
+        write_whole(path, json.dumps({str(number): labels[number] for number in sorted(labels)}, indent=2) + "\n")
+    else:
+        path.unlink(missing_ok=True)
 
 
 def add_origin(folder, made):

@@ -1,20 +1,18 @@
 """The `paws` command of the wheel: `python -m paws_twin`."""
 
-import os
+from __future__ import annotations
+
 import signal
 import sys
-import sysconfig
-from pathlib import Path
+
+from ._call import worker
 
 
-def say_program() -> None:
-    """Tells `paws batch` what to start for each recording: of this process the program is Python."""
-    name = "paws.exe" if sys.platform == "win32" else "paws"
-    for folder in (sysconfig.get_path("scripts"), Path(sys.executable).parent):
-        program = Path(folder) / name
-        if program.is_file():
-            os.environ.setdefault("PAWS_PROGRAM", str(program))
-            return
+def with_worker(words: list[str]) -> list[str]:
+    """A command line in which `paws batch` is told what to start for each recording."""
+    if words[:1] == ["batch"] and not any(word.startswith("--worker") for word in words):
+        return ["batch", *(f"--worker={word}" for word in worker()), *words[1:]]
+    return words
 
 
 def main() -> int:
@@ -22,8 +20,7 @@ def main() -> int:
 
     # Nothing of Python runs from here on: Ctrl-C ends the process as it ends the program.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    say_program()
-    return _native.main(["paws", *sys.argv[1:]])
+    return _native.main(["paws", *with_worker(sys.argv[1:])])
 
 
 if __name__ == "__main__":

@@ -5,15 +5,20 @@ from __future__ import annotations
 import contextlib
 import os
 import subprocess
+import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Union
 
 try:
     from . import _native
 except ImportError:  # An editable copy without the wheel; PAWS_COMMAND says what to run instead.
-    _native = None
+    _native = None  # type: ignore[assignment]
+
+#: A file or a folder: its path, or a Recording or Twin.
+AnyPath = Union[str, "os.PathLike[str]"]
 
 #: Called with a step's name, how much of it is done, and of how much.
 Progress = Callable[[str, int, int], object]
@@ -50,6 +55,17 @@ def call(command: str, *args: object, progress: Progress | None = None, **option
     return Said(code, out, tuple(line for line in notes.splitlines() if line.strip()))
 
 
+def worker() -> list[str]:
+    """The command that starts `paws` as a program of its own, a word each: `paws batch` starts it for each recording. Of a
+    process that runs commands in itself the program is Python, or whatever holds it.
+    """
+    if not sys.executable:
+        raise PawsError('this program does not say what its Python is: give worker=["paws"], the words that start paws')
+    # Without -P a file of the current folder could take the place of a module.
+    safe = ["-P"] if sys.version_info >= (3, 11) else []
+    return [sys.executable, *safe, "-m", "paws_twin"]
+
+
 def _in_child(words: list[str]) -> tuple[int, str, str, str | None]:
     try:
         done = subprocess.run(words, capture_output=True, text=True, errors="replace")
@@ -57,8 +73,8 @@ def _in_child(words: list[str]) -> tuple[int, str, str, str | None]:
         raise PawsError(f"PAWS_COMMAND={words[0]}: {error.strerror}") from error
     if done.returncode in (0, 1):
         return done.returncode, done.stdout, done.stderr, None
-    notes, _, error = ("\n" + done.stderr).rpartition("\nerror: ")
-    return 2, done.stdout, notes, error.strip() or f"{words[0]} ended with {done.returncode}"
+    notes, _, why = ("\n" + done.stderr).rpartition("\nerror: ")
+    return 2, done.stdout, notes, why.strip() or f"{words[0]} ended with {done.returncode}"
 
 
 def flags(options: Mapping[str, object]) -> list[str]:
@@ -83,7 +99,7 @@ def text(value: object) -> str:
 
 
 @contextlib.contextmanager
-def config_file(config: object):
+def config_file(config: object) -> Iterator[Any]:
     """`--config`'s value: a path or word as it is, a mapping as a TOML file that lives as long as the context."""
     if not isinstance(config, Mapping):
         yield config

@@ -6,34 +6,56 @@ import json
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any, Union
 
 import numpy as np
 
-from ._call import PawsError, Progress, call, config_file
+from ._call import AnyPath, PawsError, Progress, call, config_file
+from ._rerun import rerun_log
 from .recording import Recording, read_json
 from .results import Checked, PathJoint, Prediction, Report, Validation
 from .twins import Twin
+
+#: Parameters: a TOML file, a mapping of its tables, or the word "paper" or "paper_s".
+Config = Union[AnyPath, Mapping[str, Any], None]
 
 #: Columns of a bare path by how many it has.
 _COLUMNS = {3: "x,y,z", 4: "t,x,y,z", 7: "x,y,z,qx,qy,qz,qw", 8: "t,x,y,z,qx,qy,qz,qw"}
 
 
-def twin(recording, out=None, *, config=None, progress: Progress | None = None, **options) -> Twin:
-    """Makes a twin of a recording (a folder or a Recording), into `out` or a temporary folder.
+def twin(
+    recording: AnyPath,
+    out: AnyPath | None = None,
+    *,
+    config: Config = None,
+    progress: Progress | None = None,
+    rerun: AnyPath | None = None,
+    **options: Any,
+) -> Twin:
+    """Makes a twin of a recording (a folder or a Recording), into `out` or a temporary folder. With `rerun="file.rrd"` a log for
+    the rerun viewer is written, too.
 
     `config` is a TOML file, a mapping of its tables, or the word "paper" or "paper_s". `options` are those of `paws twin` with
     underscores: `as_is`, `fix`, `follow_links`, `keep`, `vlm_url`, `vlm_model`, ...
     """
     temporary = tempfile.TemporaryDirectory(prefix="paws_twin_") if out is None else None
-    folder = Path(temporary.name) / "twin" if temporary else Path(out)
+    folder = Path(temporary.name) / "twin" if temporary else Path(out or "")
     with config_file(config) as file:
         said = call("twin", recording, progress=progress, out=folder, config=file, **options)
     made = Twin(folder, said.notes)
     made._temporary = temporary
+    if rerun is not None:
+        rerun_log(recording, made, rerun)
     return made
 
 
-def infer(recordings, *, config=None, progress: Progress | None = None, **options) -> list[Prediction]:
+def infer(
+    recordings: AnyPath | Sequence[AnyPath],
+    *,
+    config: Config = None,
+    progress: Progress | None = None,
+    **options: Any,
+) -> list[Prediction]:
     """The joints of a recording, or of a list of them, one answer a clip, without building a twin. Options as of `paws infer`:
     `physics`, `as_is`, `fix`, ...
     """
@@ -43,7 +65,7 @@ def infer(recordings, *, config=None, progress: Progress | None = None, **option
         return [Prediction.of(row) for row in read_json(out)["predictions"]]
 
 
-def infer_path(path, *, config=None, **options) -> PathJoint:
+def infer_path(path: Any, *, config: Config = None, **options: Any) -> PathJoint:
     """The joint that a bare path shows: a file, or an array with a row a moment: x y z, with a time in front, and a
     quaternion x y z w behind where there is one (3, 4, 7 or 8 columns).
     """
@@ -53,7 +75,14 @@ def infer_path(path, *, config=None, **options) -> PathJoint:
         return PathJoint.of(read_json(out)[0])
 
 
-def validate(model, trajectories=None, *, config=None, progress: Progress | None = None, **options) -> Validation:
+def validate(
+    model: AnyPath,
+    trajectories: Any = None,
+    *,
+    config: Config = None,
+    progress: Progress | None = None,
+    **options: Any,
+) -> Validation:
     """Replays recorded hands on a twin, or on anybody's URDF or MJCF, or joints found elsewhere.
 
     For what is not a twin of ours `trajectories` maps joints to paths (files or arrays, as for `infer_path`); one path alone
@@ -73,37 +102,48 @@ def validate(model, trajectories=None, *, config=None, progress: Progress | None
         return Validation.of(read_json(out), said.notes)
 
 
-def check(*files) -> list[Checked]:
+def check(*files: AnyPath) -> list[Checked]:
     """The static points of "simulation-ready" of URDF, MJCF and glTF files, or of folders with such files."""
     said = call("check", *files, json=True)
     return [Checked.of(raw) for raw in json.loads(said.out)]
 
 
-def evaluate(predictions, truth, **options) -> Report:
+def evaluate(
+    predictions: AnyPath | Sequence[Prediction], truth: AnyPath | Sequence[AnyPath], **options: Any
+) -> Report:
     """Predictions (a twin, its folder, a predictions.json, a list of Prediction) against the truth of a recording or of a list
     of them. Options as of `paws evaluate`: `against`, `csv`, `points`, ...
     """
     with tempfile.TemporaryDirectory(prefix="paws_evaluate_") as folder:
-        if isinstance(predictions, Sequence) and predictions and isinstance(predictions[0], Prediction):
+        given: Any = predictions
+        if isinstance(given, Sequence) and given and isinstance(given[0], Prediction):
             written = Path(folder) / "predictions.json"
-            written.write_text(json.dumps({"predictions": [dict(p.raw) for p in predictions]}), encoding="utf-8")
-            predictions = written
+            written.write_text(json.dumps({"predictions": [dict(p.raw) for p in given]}), encoding="utf-8")
+            given = written
         out = Path(folder) / "report.json"
-        said = call("evaluate", predictions, *_several(truth), json=out, **options)
+        said = call("evaluate", given, *_several(truth), json=out, **options)
         return Report.of(read_json(out), said.out)
 
 
-def export(twin_or_joints, out, formats: Sequence[str] | None = None, **options) -> list[Path]:
+def export(
+    twin_or_joints: AnyPath, out: AnyPath, formats: Sequence[str] | None = None, **options: Any
+) -> list[Path]:
     """Writes a twin, or joints that another program found (docs/joints-format.md), as files in `out`; answers with them.
 
-    Formats: urdf, mjcf, gltf, gltf-physics, usd (all of these by default), arti4d, egoarti, usdnet.
+    Formats: urdf, mjcf, gltf, gltf-physics, usd, primitives (all of these by default), arti4d, egoarti, usdnet.
     """
     chosen = ",".join(formats) if formats is not None else None
     said = call("export", twin_or_joints, out=Path(out), format=chosen, **options)
     return [Path(line) for line in said.out.splitlines() if line.strip()]
 
 
-def import_recording(sources, out=None, *, progress: Progress | None = None, **options) -> Recording:
+def import_recording(
+    sources: AnyPath | Sequence[AnyPath],
+    out: AnyPath | None = None,
+    *,
+    progress: Progress | None = None,
+    **options: Any,
+) -> Recording:
     """Makes a recording of what a device, a data set or networks wrote (docs/import.md); `sources` is a path, a `KIND=PATH` or a
     list of them, the most important one first. Options as of `paws import`: `fps`, `rotate`, `up`, `source_fps`, ...
 
@@ -112,27 +152,33 @@ def import_recording(sources, out=None, *, progress: Progress | None = None, **o
     return _recording("import", sources, out, progress, options)
 
 
-def synth(out=None, *, progress: Progress | None = None, **options) -> Recording:
+def synth(out: AnyPath | None = None, *, progress: Progress | None = None, **options: Any) -> Recording:
     """Renders the recording of a synthetic kitchen with a known answer. Options as of `paws synth`: `seed`, `tier`, `width`,
     `parts`, ...
     """
     return _recording("synth", (), out, progress, options)
 
 
-def _recording(command: str, sources, out, progress, options) -> Recording:
+def _recording(
+    command: str,
+    sources: AnyPath | Sequence[AnyPath],
+    out: AnyPath | None,
+    progress: Progress | None,
+    options: Mapping[str, Any],
+) -> Recording:
     temporary = tempfile.TemporaryDirectory(prefix="paws_recording_") if out is None else None
-    folder = Path(temporary.name) / "recording" if temporary else Path(out)
+    folder = Path(temporary.name) / "recording" if temporary else Path(out or "")
     call(command, *_several(sources), progress=progress, out=folder, **options)
     made = Recording(folder)
     made._temporary = temporary
     return made
 
 
-def _several(paths) -> list:
+def _several(paths: Any) -> list[Any]:
     return list(paths) if isinstance(paths, (list, tuple)) else [paths]
 
 
-def _path_file(path, folder: Path, name: str) -> Path:
+def _path_file(path: Any, folder: Path, name: str) -> Path:
     """A path's file: the one given, or the array written into `folder`."""
     if isinstance(path, (str, Path)):
         return Path(path)

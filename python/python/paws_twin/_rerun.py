@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from ._call import AnyPath
 from .recording import Recording, rotation
 from .twins import Twin, needed
 
@@ -15,7 +17,7 @@ GREEN, RED, GREY, BLUE = [60, 180, 75], [220, 50, 50], [150, 150, 150], [70, 110
 COLOURS = {"pass": GREEN, "fail": RED, "undetermined": [230, 160, 30]}
 
 
-def rerun_log(recording, twin, file) -> Path:
+def rerun_log(recording: AnyPath, twin: AnyPath, file: AnyPath) -> Path:
     """Writes what was recorded (images, depth, poses, hands), the twin and the replay of every clip to `file` (.rrd), which
     `rerun FILE` shows. Needs `pip install 'paws-twin[rerun]'`.
 
@@ -38,7 +40,7 @@ def rerun_log(recording, twin, file) -> Path:
     return file
 
 
-def _frames(rr, stream, recording: Recording) -> None:
+def _frames(rr: Any, stream: Any, recording: Recording) -> None:
     cameras = recording.table("cameras.json")
     size = [cameras["width"], cameras["height"]]
     stream.log("world/camera", rr.Pinhole(image_from_camera=recording.intrinsics, resolution=size), static=True)
@@ -59,11 +61,11 @@ def _frames(rr, stream, recording: Recording) -> None:
             stream.log("clips", rr.TextLog(f"{clip['clip']}: {clip.get('narration', '')}"))
 
 
-def _depth(rr, file: Path):
+def _depth(rr: Any, file: Path) -> Any:
     return rr.EncodedDepthImage(blob=file.read_bytes(), media_type="image/png", meter=DEPTH_PER_METRE)
 
 
-def _hands(rr, stream, recording: Recording) -> None:
+def _hands(rr: Any, stream: Any, recording: Recording) -> None:
     times = recording.times
     for number, points, held in recording.hand_points():
         stream.set_time("time", duration=float(times[number]))
@@ -71,7 +73,7 @@ def _hands(rr, stream, recording: Recording) -> None:
         stream.log("world/hands", rr.Points3D(points, colors=colours, radii=0.005))
 
 
-def _twin(rr, stream, twin: Twin) -> None:
+def _twin(rr: Any, stream: Any, twin: Twin) -> None:
     scene = twin.path / "scene.glb"
     if scene.is_file():
         stream.log("world/scene", rr.Asset3D(path=scene), static=True)
@@ -91,7 +93,7 @@ def _twin(rr, stream, twin: Twin) -> None:
         stream.log(f"{at}/box", shape, static=True)
 
 
-def _replays(rr, stream, twin: Twin) -> None:
+def _replays(rr: Any, stream: Any, twin: Twin) -> None:
     for verdict in twin.validation.joints if twin.validation else ():
         starts = {clip: times for clip, times, _ in twin.hands(verdict.id)}
         for replay in verdict.clips:

@@ -25,10 +25,11 @@ from typing import Any
 
 import numpy as np
 
+from ._call import AnyPath
 from .twins import Twin, needed
 
-gymnasium = needed("gymnasium", "gym")
-mujoco = needed("mujoco", "gym")
+gymnasium: Any = needed("gymnasium", "gym")
+mujoco: Any = needed("mujoco", "gym")
 
 #: ManiSkill's bounds on a part that stands still.
 STILL_M_PER_S = 0.1
@@ -39,7 +40,7 @@ MAX_STEPS = 100
 MOVED_SHARE = 1e-3
 
 
-class OpenDrawerOrDoor(gymnasium.Env):
+class OpenDrawerOrDoor(gymnasium.Env):  # type: ignore[misc]
     """Opens or closes one joint of a twin: see the head of the module.
 
     `joint` and `task` ("open" or "close") are drawn anew at every reset where they are None; `reset(options={"joint": ...,
@@ -51,7 +52,7 @@ class OpenDrawerOrDoor(gymnasium.Env):
 
     def __init__(
         self,
-        twin,
+        twin: AnyPath,
         joint: str | None = None,
         task: str | None = None,
         *,
@@ -76,7 +77,7 @@ class OpenDrawerOrDoor(gymnasium.Env):
         self.substeps = max(1, round(1.0 / (control_hz * self.model.opt.timestep)))
         self.render_mode = render_mode
         self.size = size
-        self._renderer = None
+        self._renderer: Any = None
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (3,), np.float32)
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (9,), np.float32)
         self._choose(self.twin.joints[0].id, "open")
@@ -95,7 +96,9 @@ class OpenDrawerOrDoor(gymnasium.Env):
         self._start, self._end = (low, high) if task == "open" else (high, low)
         self.target_qpos = self._start + (self._end - self._start) * self.min_open_frac
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
         super().reset(seed=seed)
         asked = {**self.fixed, **(options or {})}
         names = [j.id for j in self.twin.joints]
@@ -107,7 +110,7 @@ class OpenDrawerOrDoor(gymnasium.Env):
         mujoco.mj_forward(self.model, self.data)
         return self._observation(), self._info()
 
-    def step(self, action):
+    def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         force = self.max_force * np.clip(np.asarray(action, dtype=float), -1.0, 1.0)
         for _ in range(self.substeps):
             self.data.qfrc_applied[:] = 0.0
@@ -155,7 +158,7 @@ class OpenDrawerOrDoor(gymnasium.Env):
         reward = 5.0 if info["success"] else reaching + (3.0 if info["open_enough"] else 2.0 * info["done"])
         return reward / 5.0 if self.reward_mode == "normalized_dense" else reward
 
-    def render(self):
+    def render(self) -> np.ndarray | None:
         if self.render_mode != "rgb_array":
             return None
         if self._renderer is None:

@@ -7,13 +7,14 @@ import json
 import struct
 import tempfile
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from ._call import PawsError
+from ._call import AnyPath, PawsError
 
 #: Rows of 21 hand joints in MANO/OpenPose order that are the tips of thumb, index and middle finger.
 TIPS = (4, 8, 12)
@@ -45,9 +46,9 @@ class Hand:
 class Recording:
     """A recording in a folder; `path` is the folder. Its tables are read when they are asked for, its images by the commands."""
 
-    def __init__(self, path):
+    def __init__(self, path: AnyPath):
         self.path = Path(path)
-        self._temporary = None
+        self._temporary: tempfile.TemporaryDirectory[str] | None = None
 
     def __fspath__(self) -> str:
         return str(self.path)
@@ -60,12 +61,12 @@ class Recording:
         """The folder's name."""
         return self.path.resolve().name
 
-    def table(self, name: str):
+    def table(self, name: str) -> Any:
         """A JSON table of the folder, as it is: `cameras.json`, `clips.json`, ..."""
         return read_json(self.path / name)
 
     @property
-    def clips(self) -> list[dict]:
+    def clips(self) -> list[dict[str, Any]]:
         """The narrated segments."""
         return self.table("clips.json")["clips"]
 
@@ -90,7 +91,7 @@ class Recording:
         c = self.table("cameras.json")
         return np.array([[c["fx"], 0, c["cx"]], [0, c["fy"], c["cy"]], [0, 0, 1.0]])
 
-    def hand_points(self):
+    def hand_points(self) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
         """Of each frame with hands: its number, their points (k x 3, world), and which points are of a hand that holds something.
         All joints where the recording has them, else the tips of thumb, index and middle finger.
         """
@@ -110,19 +111,19 @@ class Recording:
     def from_arrays(
         cls,
         *,
-        intrinsics,
+        intrinsics: Any,
         size: tuple[int, int],
-        poses,
-        times,
-        clips: Sequence[Mapping],
+        poses: Any,
+        times: Any,
+        clips: Sequence[Mapping[str, Any]],
         hands: Iterable[Hand],
-        depth: Sequence | None = None,
-        rgb: Sequence | None = None,
-        normals: Sequence | None = None,
-        masks: Sequence | None = None,
+        depth: Sequence[Any] | None = None,
+        rgb: Sequence[Any] | None = None,
+        normals: Sequence[Any] | None = None,
+        masks: Sequence[Any] | None = None,
         labels: Mapping[int, str] | None = None,
-        points=None,
-        out=None,
+        points: Any = None,
+        out: AnyPath | None = None,
     ) -> Recording:
         """Writes a recording's folder of arrays: into `out`, or into a temporary folder that goes with the object.
 
@@ -142,7 +143,7 @@ class Recording:
             if frames is not None and len(frames) != len(poses):
                 raise PawsError(f"{name}: {len(frames)} images for {len(poses)} poses; give None where a frame has none")
         temporary = tempfile.TemporaryDirectory(prefix="paws_recording_") if out is None else None
-        folder = Path(temporary.name) / "recording" if temporary else Path(out)
+        folder = Path(temporary.name) / "recording" if temporary else Path(out or "")
         if folder.exists() and any(folder.iterdir()):
             raise PawsError(f"{folder}: exists and is not empty; choose another out")
         folder.mkdir(parents=True, exist_ok=True)
@@ -164,7 +165,16 @@ class Recording:
         return recording
 
 
-def _write_tables(folder, intrinsics, size, poses, times, clips, hands, with_image) -> None:
+def _write_tables(
+    folder: Path,
+    intrinsics: np.ndarray,
+    size: tuple[int, int],
+    poses: np.ndarray,
+    times: np.ndarray,
+    clips: Sequence[Mapping[str, Any]],
+    hands: Iterable[Hand],
+    with_image: set[tuple[str, int]],
+) -> None:
     frames = []
     for number, (pose, time) in enumerate(zip(poses, times)):
         frame = {"frame": number, "timestamp": float(time), "position": pose[:3, 3].tolist()}
@@ -201,7 +211,7 @@ def _normal_bytes(normals: np.ndarray) -> np.ndarray:
     return bytes_
 
 
-_PIXELS = {
+_PIXELS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "depth": _millimetres,
     "frames": lambda a: a.astype(np.uint8),
     "normals": _normal_bytes,
@@ -232,7 +242,7 @@ def write_png(path: Path, pixels: np.ndarray) -> None:
             file.write(struct.pack(">I", len(chunk)) + kind + chunk + struct.pack(">I", zlib.crc32(kind + chunk)))
 
 
-def write_ply(path: Path, points) -> None:
+def write_ply(path: Path, points: Any) -> None:
     """Writes m x 3 points."""
     points = np.asarray(points, dtype="<f4")
     if points.ndim != 2 or points.shape[1] != 3:
@@ -242,7 +252,7 @@ def write_ply(path: Path, points) -> None:
     path.write_bytes("\n".join(lines).encode() + points.tobytes())
 
 
-def read_json(path: Path):
+def read_json(path: Path) -> Any:
     """A JSON file; PawsError where it is missing or no JSON."""
     try:
         with open(path, encoding="utf-8") as file:
@@ -253,11 +263,11 @@ def read_json(path: Path):
         raise PawsError(f"{path}: {error}") from None
 
 
-def write_json(path: Path, value) -> None:
+def write_json(path: Path, value: object) -> None:
     path.write_text(json.dumps(value, indent=1) + "\n", encoding="utf-8")
 
 
-def rotation(wxyz) -> np.ndarray:
+def rotation(wxyz: Any) -> np.ndarray:
     """The matrix of a quaternion w x y z."""
     w, x, y, z = np.asarray(wxyz, dtype=float) / np.linalg.norm(wxyz)
     return np.array(

@@ -277,7 +277,7 @@ class Report:
         return cls(raw["clips"], raw["answered"], {r["rule"]: r["micro"] for r in raw["rules"]}, table, raw)
 
 
-def named(items: tuple, id: str):
+def named(items: tuple[Any, ...], id: str) -> Any:
     """The one of that id."""
     for item in items:
         if item.id == id:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from ._call import PawsError
+from ._call import AnyPath, PawsError
 from .recording import read_json
 from .results import TwinJoint, Validation, named
 
@@ -18,7 +20,7 @@ class Twin:
     A twin that was made without `out` lies in a temporary folder that goes with the object.
     """
 
-    def __init__(self, path, notes: tuple[str, ...] = ()):
+    def __init__(self, path: AnyPath, notes: tuple[str, ...] = ()):
         self.path = Path(path)
         self.notes = notes
         self.raw = read_json(self.path / "twin.json")
@@ -26,7 +28,7 @@ class Twin:
         self.joints = tuple(TwinJoint.of(f) for f in self.raw["furniture"])
         verdicts = self.path / "validation.json"
         self.validation = Validation.of(read_json(verdicts)) if verdicts.is_file() else None
-        self._temporary = None
+        self._temporary: tempfile.TemporaryDirectory[str] | None = None
 
     def __fspath__(self) -> str:
         return str(self.path)
@@ -60,18 +62,18 @@ class Twin:
             raise PawsError(f"{path}: no such file or folder; paws_twin.export writes it")
         return path
 
-    def mujoco(self):
+    def mujoco(self) -> Any:
         """The scene as a MuJoCo model (`mujoco.MjModel`), with floor, light, handle sites, keyframes `closed` and `open`."""
         return needed("mujoco").MjModel.from_xml_path(str(self.file("scene.xml")))
 
-    def mjspec(self):
+    def mjspec(self) -> Any:
         """The kitchen without floor and light as a `mujoco.MjSpec`, to attach to a scene of one's own:
         `scene.attach(twin.mjspec(), prefix="kitchen/", frame=scene.worldbody.add_frame())`.
         """
         return needed("mujoco").MjSpec.from_file(str(self.file("kitchen.xml")))
 
 
-def needed(module: str, extra: str | None = None):
+def needed(module: str, extra: str | None = None) -> Any:
     """An optional module, or the way to get it."""
     import importlib
 

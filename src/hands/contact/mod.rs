@@ -6,6 +6,7 @@
 //! is from the fingertips, how much that varies, how much hands tremble and how often flags are right is measured in each
 //! recording.
 
+pub(super) mod alone;
 pub(super) mod motion;
 pub(super) mod view;
 
@@ -27,29 +28,6 @@ pub struct Hold {
     pub frames: [usize; 2],
 }
 
-/// Nothing is looked for farther from the fingertips, metres: twice a hand's breadth and more is not contact.
-const REACH_M: f64 = 0.3;
-/// Distances of a hand in the air fall off with this, metres: about half of the way that a hand reaches.
-const FREE_M: f64 = 0.3;
-/// Share of the samples of a hold of which the distance says nothing: hands that are placed wrongly, depth of something else.
-const ASTRAY: f64 = 0.25;
-/// How long people hold what they open or close, seconds: the middle, and the standard deviation of its logarithm (two thirds
-/// of all holds last 0.75 to 3 s). A judgement; it keeps a single near sample from being a hold.
-const HOLD_SECS: f64 = 1.5;
-const HOLD_LOG_STD: f64 = 0.7;
-/// One sample says no more than this for or against contact, nats: its neighbours have the same error.
-const SAYS_AT_MOST: f64 = 3.0;
-/// Neighbouring flags are wrong together: half of each is news. A judgement.
-const FLAG_NEWS: f64 = 0.5;
-/// Still frames before and after the clip that are looked at, and how far away they may be.
-const STILL_FRAMES: usize = 3;
-const STILL_WITHIN_SECS: f64 = 4.0;
-/// Distances vary by no less than this, metres: fingers lie around a handle, depth is smooth over its edge. The samples that
-/// are taken for contact are the near ones, so that what they show is too little.
-const LEAST_STD_M: f64 = 0.03;
-/// The same from clip to clip.
-const LEAST_BETWEEN_M: f64 = 0.01;
-
 /// For each clip the stretch in which a hand holds something; `None` where the narration moves nothing, no hand was seen or
 /// nothing speaks for contact.
 ///
@@ -67,7 +45,7 @@ pub fn holds(recording: &Recording, at_work: &AtWork, config: &config::Hands) ->
             _ => clip_tracks(recording, clip, at_work, config),
         })
         .collect::<Result<_>>()?;
-    let spans = settled(&mut tracks);
+    let spans = settled(&mut tracks, config);
     Ok(tracks
         .iter()
         .zip(&spans)
@@ -79,23 +57,28 @@ pub fn holds(recording: &Recording, at_work: &AtWork, config: &config::Hands) ->
         .collect())
 }
 
-/// Holds, widths and flags explain each other: three rounds, in the last of which the flags speak, too.
-fn settled(tracks: &mut [Vec<Track>]) -> Vec<Option<Span>> {
-    let tremble = motion::tremble_m(tracks.iter().flatten().map(|t| (t.times.as_slice(), t.places.as_slice())));
+/// Holds, widths and flags explain each other: some rounds, in the last of which the flags speak, too.
+fn settled(tracks: &mut [Vec<Track>], config: &config::Hands) -> Vec<Option<Span>> {
+    let ways = tracks.iter().flatten().map(|t| (t.times.as_slice(), t.places.as_slice()));
+    let tremble = motion::tremble_m(ways, config);
     for track in tracks.iter_mut().flatten() {
-        track.rests = motion::rests(&track.times, &track.places, tremble);
+        track.rests = motion::rests(&track.times, &track.places, tremble, config);
     }
-    let mut widths = Widths::default();
-    let mut found = spans(tracks, &widths, &Flags::default());
-    for round in 0..3 {
-        widths = Widths::of(tracks, &found);
-        let flags = if round == 2 { Flags::of(tracks, &found) } else { Flags::default() };
+    if alone::is_blind(tracks) {
+        return alone::settled(tracks, tremble, config);
+    }
+    let rules = &config.contact;
+    let mut widths = Widths::unknown(rules);
+    let mut found = spans(tracks, &widths, &Flags::default(), config);
+    for round in 1..=rules.rounds {
+        widths = Widths::of(tracks, &found, rules);
+        let flags = if round == rules.rounds { Flags::of(tracks, &found, config) } else { Flags::default() };
         for (tracks, span) in tracks.iter_mut().zip(&found) {
             let Some(span) = span else { continue };
             let track = &mut tracks[span.track];
-            track.on_path = motion::on_path(&track.places, span.first, span.last, tremble);
+            track.on_path = motion::on_path(&track.places, [span.first, span.last], tremble, config);
         }
-        found = spans(tracks, &widths, &flags);
+        found = spans(tracks, &widths, &flags, config);
     }
     found
 }
@@ -115,6 +98,10 @@ struct Track {
     before: Vec<Option<f64>>,
     after: Vec<Option<f64>>,
     flags: Vec<Option<bool>>,
+    /// Distance between the tips of thumb and index, metres.
+    openings: Vec<f64>,
+    /// When the clip begins and ends by its narration, seconds.
+    told_secs: [f64; 2],
     /// Log odds of each sample for being the first and the last of a hold, by whether the hand rests.
     rests: Vec<[f64; 2]>,
     /// Log odds of contact by the line or arc of the hold that was found before; `None` where it shows none.
@@ -135,7 +122,16 @@ struct Span {
     nats: f64,
 }
 
-fn clip_tracks(recording: &Recording, clip: &Clip, at_work: &AtWork, config: &config::Hands) -> Result<Vec<Track>> {
+/// Frames whose depth [`holds`] asks about a clip, in no order. Images are not read.
+#[must_use]
+pub fn frames(recording: &Recording, clip: &Clip, at_work: &AtWork, config: &config::Hands) -> Vec<usize> {
+    let mut all = looked_at(recording, &hand_tracks(recording, clip, config), config.contact_every_secs);
+    all.extend(still_frames(recording, clip, at_work, &config.contact).into_iter().map(|(frame, _)| frame));
+    all
+}
+
+/// The hands in and around a clip, of which nothing has been looked at yet.
+fn hand_tracks(recording: &Recording, clip: &Clip, config: &config::Hands) -> Vec<Track> {
     let [from, to] = widened(recording, clip, config.widen_secs);
     let around = recording.hands_in(from, to);
     let mut tracks: Vec<Track> = Vec::new();
@@ -153,7 +149,7 @@ fn clip_tracks(recording: &Recording, clip: &Clip, at_work: &AtWork, config: &co
         tracks.push(Track {
             side,
             frames: samples.iter().map(|s| s.frame).collect(),
-            stretches: motion::stretches(&times, &places),
+            stretches: motion::stretches(&times, &places, config),
             times,
             places,
             rests: vec![[0.0; 2]; n],
@@ -162,25 +158,33 @@ fn clip_tracks(recording: &Recording, clip: &Clip, at_work: &AtWork, config: &co
             before: vec![None; n],
             after: vec![None; n],
             flags: samples.iter().map(|s| s.contact).collect(),
+            openings: samples.iter().map(|s| (s.tips[0] - s.tips[1]).norm()).collect(),
+            told_secs: [clip.start_frame, clip.end_frame]
+                .map(|f| recording.frames.get(f).map_or(0.0, |frame| frame.timestamp_secs)),
             starts_by,
             ends_from,
         });
     }
+    tracks
+}
+
+fn clip_tracks(recording: &Recording, clip: &Clip, at_work: &AtWork, config: &config::Hands) -> Result<Vec<Track>> {
+    let mut tracks = hand_tracks(recording, clip, config);
     for frame in looked_at(recording, &tracks, config.contact_every_secs) {
-        let Some(view) = View::of(recording, frame)? else { continue };
+        let Some(view) = View::of(recording, frame, &config.contact)? else { continue };
         for track in &mut tracks {
             // Two rows of one frame and side are rare; the first has the distance.
             if let Ok(i) = track.frames.binary_search(&frame) {
-                track.now[i] = view.nearest_m(&track.places[i]);
+                track.now[i] = view.nearest_m(&track.places[i], &config.contact);
             }
         }
     }
-    for (still, is_before) in still_frames(recording, clip, at_work) {
-        let Some(view) = View::of(recording, still)? else { continue };
+    for (still, is_before) in still_frames(recording, clip, at_work, &config.contact) {
+        let Some(view) = View::of(recording, still, &config.contact)? else { continue };
         for track in &mut tracks {
             let known = if is_before { &mut track.before } else { &mut track.after };
             for (known, place) in known.iter_mut().zip(&track.places) {
-                let seen = view.nearest_m(place);
+                let seen = view.nearest_m(place, &config.contact);
                 *known = match (*known, seen) {
                     (Some(a), Some(b)) => Some(a.min(b)),
                     (a, b) => a.or(b),
@@ -189,7 +193,7 @@ fn clip_tracks(recording: &Recording, clip: &Clip, at_work: &AtWork, config: &co
         }
     }
     for track in &mut tracks {
-        track.now = between(&track.times, &track.now, 2.5 * config.contact_every_secs);
+        track.now = between(&track.times, &track.now, config.contact.between_looks * config.contact_every_secs);
     }
     Ok(tracks)
 }
@@ -214,14 +218,14 @@ fn looked_at(recording: &Recording, tracks: &[Track], every_secs: f64) -> Vec<us
 }
 
 /// Frames without an interaction near a clip, and whether they are before it.
-fn still_frames(recording: &Recording, clip: &Clip, at_work: &AtWork) -> Vec<(usize, bool)> {
+fn still_frames(recording: &Recording, clip: &Clip, at_work: &AtWork, rules: &config::Contact) -> Vec<(usize, bool)> {
     let time = |f: usize| recording.frames.get(f).map_or(f64::INFINITY, |x| x.timestamp_secs);
     let (start, end) = (time(clip.start_frame), time(clip.end_frame));
     let still = |f: &usize| !at_work.any(*f) && recording.frames[*f].files.depth.is_some();
-    let before = (0..clip.start_frame).rev().take_while(|&f| start - time(f) <= STILL_WITHIN_SECS);
-    let after = (clip.end_frame + 1..recording.frames.len()).take_while(|&f| time(f) - end <= STILL_WITHIN_SECS);
-    let before = before.filter(still).take(STILL_FRAMES).map(|f| (f, true));
-    before.chain(after.filter(still).take(STILL_FRAMES).map(|f| (f, false))).collect()
+    let before = (0..clip.start_frame).rev().take_while(|&f| start - time(f) <= rules.still_within_secs);
+    let after = (clip.end_frame + 1..recording.frames.len()).take_while(|&f| time(f) - end <= rules.still_within_secs);
+    let before = before.filter(still).take(rules.still_frames).map(|f| (f, true));
+    before.chain(after.filter(still).take(rules.still_frames).map(|f| (f, false))).collect()
 }
 
 /// Values at times where they are known, linear in between where the gap is no longer than `gap_secs`.
@@ -256,15 +260,13 @@ pub(super) struct Widths {
     pub(super) by_clip: Vec<Option<f64>>,
 }
 
-impl Default for Widths {
-    /// Nothing measured yet: a fingertip is at the surface, estimated hands and depth are off by a few centimetres.
-    fn default() -> Self {
-        Self { mean: 0.0, std: 0.06, between: 0.0, by_clip: Vec::new() }
-    }
-}
-
 impl Widths {
-    fn of(tracks: &[Vec<Track>], spans: &[Option<Span>]) -> Self {
+    /// Nothing measured yet: a fingertip is at the surface.
+    fn unknown(rules: &config::Contact) -> Self {
+        Self { mean: 0.0, std: rules.unknown_std_m, between: 0.0, by_clip: Vec::new() }
+    }
+
+    fn of(tracks: &[Vec<Track>], spans: &[Option<Span>], rules: &config::Contact) -> Self {
         // The middle half: the hand surely holds the part there.
         let cores: Vec<Vec<f64>> = tracks
             .iter()
@@ -277,18 +279,18 @@ impl Widths {
             .collect();
         let medians: Vec<Option<f64>> = cores.iter().map(|c| stats::median(c)).collect();
         let all: Vec<f64> = cores.iter().flatten().copied().collect();
-        let Some(mean) = stats::median(&all) else { return Self::default() };
-        let spread = |deviations: Vec<f64>| 1.4826 * stats::median(&deviations).unwrap_or(0.0);
+        let Some(mean) = stats::median(&all) else { return Self::unknown(rules) };
+        let spread = |deviations: Vec<f64>| stats::NORMAL_PER_MEDIAN * stats::median(&deviations).unwrap_or(0.0);
         let own = cores.iter().zip(&medians).filter(|(core, _)| core.len() > 2);
         let deviations = own.flat_map(|(core, m)| core.iter().map(move |d| (d - m.unwrap_or(*d)).abs()));
-        let std = spread(deviations.collect()).max(LEAST_STD_M);
-        let between = spread(medians.iter().flatten().map(|m| (m - mean).abs()).collect()).max(LEAST_BETWEEN_M);
+        let std = spread(deviations.collect()).max(rules.least_std_m);
+        let between = spread(medians.iter().flatten().map(|m| (m - mean).abs()).collect()).max(rules.least_between_m);
         let by_clip = cores
             .iter()
             .zip(&medians)
             .map(|(core, median)| {
-                // Neighbouring samples share their error: about a third of them are news.
-                let news = (core.len() as f64 / 3.0).max(1.0);
+                // Neighbouring samples share their error.
+                let news = (core.len() as f64 / rules.samples_a_news).max(1.0);
                 let weight = between.powi(2) / (between.powi(2) + std.powi(2) / news);
                 median.map(|m| weight * m + (1.0 - weight) * mean)
             })
@@ -297,31 +299,33 @@ impl Widths {
     }
 
     /// Log odds of contact for a distance to a surface in a clip.
-    pub(super) fn nats(&self, clip: usize, distance_m: Option<f64>) -> f64 {
+    pub(super) fn nats(&self, clip: usize, distance_m: Option<f64>, rules: &config::Contact) -> f64 {
         let Some(d) = distance_m else { return 0.0 };
         let (mean, std) = match self.by_clip.get(clip).copied().flatten() {
-            // A third wider: the middle of a hold is steadier than its ends.
-            Some(mean) => (mean, 1.3 * self.std),
+            // The middle of a hold is steadier than its ends.
+            Some(mean) => (mean, rules.ends_widen * self.std),
             None => (self.mean, self.std.hypot(self.between)),
         };
-        let free = (-d / FREE_M).exp() / FREE_M;
+        let (astray, most) = (rules.astray_share, rules.says_at_most_nats);
+        let free = (-d / rules.free_m).exp() / rules.free_m;
         let bell = (-0.5 * ((d - mean) / std).powi(2)).exp() / (std * std::f64::consts::TAU.sqrt());
-        let held = (1.0 - ASTRAY) * bell + ASTRAY * free;
-        (held / free).ln().clamp(-SAYS_AT_MOST, SAYS_AT_MOST)
+        let held = (1.0 - astray) * bell + astray * free;
+        (held / free).ln().clamp(-most, most)
     }
 }
 
 /// What a detector's flags are worth in this recording: log odds of contact for a flag that is set, and for one that is not.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct Flags {
+pub(super) struct Flags {
     set: f64,
     unset: f64,
 }
 
 impl Flags {
-    fn of(tracks: &[Vec<Track>], spans: &[Option<Span>]) -> Self {
-        // Before anything is seen, a flag is taken to be wrong one time in ten; that counts as much as ten samples.
-        let (mut inside, mut outside) = ([1.0, 9.0], [9.0, 1.0]);
+    fn of(tracks: &[Vec<Track>], spans: &[Option<Span>], config: &config::Hands) -> Self {
+        // What a flag is taken for before anything is seen counts as much as so many samples.
+        let ([wrong, right], most) = (config.contact.flags_before, config.contact.says_at_most_nats);
+        let (mut inside, mut outside) = ([wrong, right], [right, wrong]);
         for (tracks, span) in tracks.iter().zip(spans) {
             let Some(span) = span else { continue };
             for (i, flag) in tracks[span.track].flags.iter().enumerate() {
@@ -336,11 +340,16 @@ impl Flags {
         let share = |count: [f64; 2], value: usize| count[value] / (count[0] + count[1]);
         let nats = |value: usize| f64::ln(share(inside, value) / share(outside, value));
         // A flag that is set more often without contact says nothing, rather than the reverse.
-        Self { set: nats(1).clamp(0.0, SAYS_AT_MOST), unset: nats(0).clamp(-SAYS_AT_MOST, 0.0) }
+        Self { set: nats(1).clamp(0.0, most), unset: nats(0).clamp(-most, 0.0) }
     }
 
-    fn nats(&self, flag: Option<bool>) -> f64 {
-        FLAG_NEWS
+    /// What flags are taken for before anything is known about them.
+    pub(super) fn unknown(config: &config::Hands) -> Self {
+        Self::of(&[], &[], config)
+    }
+
+    pub(super) fn nats(&self, flag: Option<bool>, config: &config::Hands) -> f64 {
+        config.contact.flag_news
             * match flag {
                 Some(true) => self.set,
                 Some(false) => self.unset,
@@ -350,12 +359,13 @@ impl Flags {
 }
 
 /// The stretch of each clip that most speaks for.
-fn spans(tracks: &[Vec<Track>], widths: &Widths, flags: &Flags) -> Vec<Option<Span>> {
+fn spans(tracks: &[Vec<Track>], widths: &Widths, flags: &Flags, config: &config::Hands) -> Vec<Option<Span>> {
     tracks
         .iter()
         .enumerate()
         .map(|(clip, tracks)| {
-            let best = tracks.iter().enumerate().filter_map(|(t, track)| best_span(t, track, clip, widths, flags));
+            let best =
+                tracks.iter().enumerate().filter_map(|(t, track)| best_span((t, track), clip, widths, flags, config));
             best.fold(None, |best: Option<Span>, span| match best {
                 Some(b) if b.nats >= span.nats => Some(b),
                 _ => Some(span),
@@ -366,26 +376,35 @@ fn spans(tracks: &[Vec<Track>], widths: &Widths, flags: &Flags) -> Vec<Option<Sp
 
 /// Sum of what each sample says, of how near the furniture is to the first sample before the clip and to the last one after
 /// it, and of how long holds last: before, during and after are one chain.
-fn best_span(index: usize, track: &Track, clip: usize, widths: &Widths, flags: &Flags) -> Option<Span> {
+fn best_span(
+    (index, track): (usize, &Track),
+    clip: usize,
+    widths: &Widths,
+    flags: &Flags,
+    config: &config::Hands,
+) -> Option<Span> {
+    let rules = &config.contact;
     let says = track.now.iter().zip(&track.flags).enumerate().map(|(i, (now, flag))| {
         let on_path = track.on_path.as_ref().map_or(0.0, |nats| nats[i]);
-        (widths.nats(clip, *now) + flags.nats(*flag) + on_path).clamp(-SAYS_AT_MOST, SAYS_AT_MOST)
+        let nats = widths.nats(clip, *now, rules) + flags.nats(*flag, config) + on_path;
+        nats.clamp(-rules.says_at_most_nats, rules.says_at_most_nats)
     });
     // `sums[i]`: what all samples before the i-th say.
     let mut sums = vec![0.0];
     for nats in says {
         sums.push(sums[sums.len() - 1] + nats);
     }
-    let ends: Vec<f64> =
-        (0..track.frames.len()).map(|j| sums[j + 1] + widths.nats(clip, track.after[j]) + track.rests[j][1]).collect();
+    let ends: Vec<f64> = (0..track.frames.len())
+        .map(|j| sums[j + 1] + widths.nats(clip, track.after[j], rules) + track.rests[j][1])
+        .collect();
     let mut best: Option<Span> = None;
     for (first, sum) in sums.iter().enumerate().take(track.starts_by + 1) {
-        let begin = widths.nats(clip, track.before[first]) + track.rests[first][0] - sum;
+        let begin = widths.nats(clip, track.before[first], rules) + track.rests[first][0] - sum;
         for (last, end) in ends.iter().enumerate().skip(first.max(track.ends_from)) {
             if track.stretches[last] != track.stretches[first] {
                 break;
             }
-            let nats = begin + end + lasts(track.times[last] - track.times[first]);
+            let nats = begin + end + lasts(track.times[last] - track.times[first], rules);
             if nats > 0.0 && best.is_none_or(|b| nats > b.nats) {
                 best = Some(Span { track: index, first, last, nats });
             }
@@ -395,9 +414,8 @@ fn best_span(index: usize, track: &Track, clip: usize, widths: &Widths, flags: &
 }
 
 /// Log likelihood of how long a hold lasts, against the most likely one.
-pub(super) fn lasts(secs: f64) -> f64 {
-    // A frame is not less than a twentieth of a second.
-    -0.5 * ((secs.max(0.05) / HOLD_SECS).ln() / HOLD_LOG_STD).powi(2)
+pub(super) fn lasts(secs: f64, rules: &config::Contact) -> f64 {
+    -0.5 * ((secs.max(rules.hold_least_secs) / rules.hold_secs).ln() / rules.hold_log_std).powi(2)
 }
 
 #[cfg(test)]
@@ -425,6 +443,8 @@ mod tests {
             before: (0..n).map(|i| (i < 12).then_some(distance(i))).collect(),
             after: (0..n).map(|i| (i > 24).then_some(distance(i))).collect(),
             flags: (0..n).map(|i| flag(i, held(i))).collect(),
+            openings: vec![0.02; n],
+            told_secs: [4.0 / 12.0, 30.0 / 12.0],
             starts_by: 30,
             ends_from: 4,
         }
@@ -432,11 +452,12 @@ mod tests {
 
     fn found(track: Track) -> (Span, Flags) {
         let tracks = vec![vec![track]];
-        let mut spans = spans(&tracks, &Widths::default(), &Flags::default());
-        let widths = Widths::of(&tracks, &spans);
-        spans = super::spans(&tracks, &widths, &Flags::default());
-        let flags = Flags::of(&tracks, &spans);
-        (super::spans(&tracks, &widths, &flags)[0].unwrap(), flags)
+        let mut spans =
+            spans(&tracks, &Widths::unknown(&config::Contact::default()), &Flags::default(), &config::Hands::default());
+        let widths = Widths::of(&tracks, &spans, &config::Contact::default());
+        spans = super::spans(&tracks, &widths, &Flags::default(), &config::Hands::default());
+        let flags = Flags::of(&tracks, &spans, &config::Hands::default());
+        (super::spans(&tracks, &widths, &flags, &config::Hands::default())[0].unwrap(), flags)
     }
 
     #[test]
@@ -467,7 +488,15 @@ mod tests {
         for d in [&mut waving.now, &mut waving.before, &mut waving.after] {
             d.iter_mut().for_each(|d| *d = Some(0.25));
         }
-        assert_eq!(spans(&[vec![waving]], &Widths::default(), &Flags::default()), [None]);
+        assert_eq!(
+            spans(
+                &[vec![waving]],
+                &Widths::unknown(&config::Contact::default()),
+                &Flags::default(),
+                &config::Hands::default()
+            ),
+            [None]
+        );
     }
 
     #[test]

@@ -3,58 +3,43 @@
 
 use nalgebra::Point2;
 
+use crate::config;
 use crate::math::circle;
 use crate::math::line::Line;
 use crate::math::plane::Plane;
 use crate::math::{Point, centroid, stats};
 
-/// How long a hand rests where it takes hold or lets go, seconds.
-const REST_SECS: f64 = 0.25;
-/// In that time a hand that reaches or withdraws goes this far, metres: the mean of an exponential; half a metre a second.
-const REACHED_M: f64 = 0.12;
-/// So far from the line or arc of a held part a free hand is, metres: the mean of an exponential.
-const BESIDE_M: f64 = 0.15;
-/// Share of samples of a hold that are placed wrongly.
-const ASTRAY: f64 = 0.25;
-/// Hands are not faster, metres a second, apart from an error of the estimate, metres.
-const FASTEST_M_PER_S: f64 = 4.0;
-const JUMP_M: f64 = 0.3;
-/// A path of fewer samples tells no arc.
-const LEAST_SAMPLES: usize = 8;
-/// Handles go around hinges at such radii, metres.
-const RADII_M: [f64; 2] = [0.08, 3.0];
-/// Standard deviation of a median absolute deviation of 1.
-const MAD: f64 = 1.4826;
-
 /// Standard deviation of a hand's position from sample to sample, metres, over all tracks; each as times and places.
-pub(crate) fn tremble_m<'a>(tracks: impl Iterator<Item = (&'a [f64], &'a [Point])>) -> f64 {
+pub(crate) fn tremble_m<'a>(tracks: impl Iterator<Item = (&'a [f64], &'a [Point])>, config: &config::Hands) -> f64 {
     let mut steps = Vec::new();
     for (times, places) in tracks {
         for i in 1..places.len().saturating_sub(1) {
-            if times[i + 1] - times[i - 1] < 0.3 {
+            if times[i + 1] - times[i - 1] < config.motion.neighbours_secs {
                 steps.push((places[i].coords - 0.5 * (places[i - 1].coords + places[i + 1].coords)).norm());
             }
         }
     }
-    // A sample against the mean of its neighbours varies by 3/2; the median of a length in space is 1.54 deviations.
+    // Arithmetic: a sample against the mean of its neighbours varies by 3/2; the median of a length in space is 1.54 deviations.
     stats::median(&steps).unwrap_or(0.0) / 1.5f64.sqrt() / 1.54
 }
 
 /// Log odds of each sample for being the first of a hold (rests after it) and the last (rested before it).
-pub(crate) fn rests(times: &[f64], places: &[Point], tremble_m: f64) -> Vec<[f64; 2]> {
+pub(crate) fn rests(times: &[f64], places: &[Point], tremble_m: f64, config: &config::Hands) -> Vec<[f64; 2]> {
+    let rules = &config.motion;
     // The rest itself is short, and a hand gives way a little.
-    let std = 1.3 * tremble_m + 0.01;
+    let std = rules.rest_widens * tremble_m + rules.gives_way_m;
+    let rest_secs = rules.rest_secs + rules.rest_slack_secs;
     let nats = |i: usize, near: &dyn Fn(f64) -> bool| {
         let others: Vec<Point> =
             times.iter().zip(places).filter(|(t, _)| near(**t - times[i])).map(|(_, p)| *p).collect();
         let middle = middle(&others)?;
         let moved = ((middle - places[i]).norm() - std).max(0.0);
-        Some(log_odds(moved, std, REACHED_M))
+        Some(log_odds(moved, std, rules.reached_m, config))
     };
     (0..times.len())
         .map(|i| {
-            let after = nats(i, &|dt| dt > 0.0 && dt <= REST_SECS + 0.02);
-            let before = nats(i, &|dt| (-REST_SECS - 0.02..0.0).contains(&dt));
+            let after = nats(i, &|dt| dt > 0.0 && dt <= rest_secs);
+            let before = nats(i, &|dt| (-rest_secs..0.0).contains(&dt));
             [after.unwrap_or(0.0), before.unwrap_or(0.0)]
         })
         .collect()
@@ -62,22 +47,29 @@ pub(crate) fn rests(times: &[f64], places: &[Point], tremble_m: f64) -> Vec<[f64
 
 /// Log odds of contact for each sample by its distance to the line or arc that the samples `first..=last` show; `None` where
 /// they show none.
-pub(crate) fn on_path(places: &[Point], first: usize, last: usize, tremble_m: f64) -> Option<Vec<f64>> {
+pub(crate) fn on_path(
+    places: &[Point],
+    [first, last]: [usize; 2],
+    tremble_m: f64,
+    config: &config::Hands,
+) -> Option<Vec<f64>> {
+    let rules = &config.motion;
     let count = last + 1 - first;
-    if count < LEAST_SAMPLES {
+    if count < rules.least_samples {
         return None;
     }
-    let (shape, typical) = shape(&places[first..=last])?;
-    let std = (MAD * typical).max(tremble_m + 0.01);
-    Some(places.iter().map(|p| log_odds(shape.distance(p), std, BESIDE_M)).collect())
+    let (shape, typical) = shape(&places[first..=last], config)?;
+    let std = (stats::NORMAL_PER_MEDIAN * typical).max(tremble_m + rules.gives_way_m);
+    Some(places.iter().map(|p| log_odds(shape.distance(p), std, rules.beside_m, config)).collect())
 }
 
 /// The line or arc of a hold, and how far its samples are typically from it, metres.
-fn shape(places: &[Point]) -> Option<(Shape, f64)> {
+fn shape(places: &[Point], config: &config::Hands) -> Option<(Shape, f64)> {
+    let rules = &config.motion;
     // Ends may be part of reaching or withdrawing.
     let core = &places[places.len() / 6..places.len() - places.len() / 6];
     // An arc has one more freedom than a line, and has to be better by as much.
-    let fits = [(Shape::line(core), 1.0), (Shape::arc(core), 1.25)];
+    let fits = [(Shape::line(core), 1.0), (Shape::arc(core, rules.radii_m), rules.arc_handicap)];
     fits.into_iter()
         .filter_map(|(shape, handicap)| {
             let shape = shape?;
@@ -90,31 +82,32 @@ fn shape(places: &[Point]) -> Option<(Shape, f64)> {
 
 /// What all samples of a hold say by how near they are to one line or arc. The width is what hands tremble, not what the samples
 /// show: a hand that wanders would widen it.
-pub(crate) fn path_nats(places: &[Point], tremble_m: f64) -> f64 {
-    /// One sample says no more against it, nats.
-    const AT_LEAST: f64 = -3.0;
-    if places.len() < LEAST_SAMPLES {
+pub(crate) fn path_nats(places: &[Point], tremble_m: f64, config: &config::Hands) -> f64 {
+    let rules = &config.motion;
+    if places.len() < rules.least_samples {
         return 0.0;
     }
-    let Some((shape, _)) = shape(places) else { return 0.0 };
-    let std = tremble_m + 0.015;
-    places.iter().map(|p| log_odds(shape.distance(p), std, BESIDE_M).max(AT_LEAST)).sum()
+    let Some((shape, _)) = shape(places, config) else { return 0.0 };
+    let std = tremble_m + rules.wanders_m;
+    let least = -config.contact.says_at_most_nats;
+    places.iter().map(|p| log_odds(shape.distance(p), std, rules.beside_m, config).max(least)).sum()
 }
 
 /// Places with what is around them in time: the median over a third of a second.
-pub(crate) fn calmed(times: &[f64], places: &[Point]) -> Vec<Point> {
-    const HALF_SECS: f64 = 0.18;
+pub(crate) fn calmed(times: &[f64], places: &[Point], config: &config::Hands) -> Vec<Point> {
+    let half_secs = config.motion.calmed_half_secs;
     (0..places.len())
         .map(|i| {
-            let from = times.partition_point(|t| *t < times[i] - HALF_SECS);
-            let to = times.partition_point(|t| *t <= times[i] + HALF_SECS);
+            let from = times.partition_point(|t| *t < times[i] - half_secs);
+            let to = times.partition_point(|t| *t <= times[i] + half_secs);
             middle(&places[from..to]).unwrap_or(places[i])
         })
         .collect()
 }
 
 /// For each sample the number of its stretch: between two stretches the hand would have been faster than hands are.
-pub(crate) fn stretches(times: &[f64], places: &[Point]) -> Vec<usize> {
+pub(crate) fn stretches(times: &[f64], places: &[Point], config: &config::Hands) -> Vec<usize> {
+    let rules = &config.motion;
     let mut number = 0;
     (0..places.len())
         .map(|i| {
@@ -123,7 +116,7 @@ pub(crate) fn stretches(times: &[f64], places: &[Point]) -> Vec<usize> {
                 let before = middle(&places[i.saturating_sub(3)..i]);
                 let after = middle(&places[i..places.len().min(i + 3)]);
                 let jump = before.zip(after).map_or(0.0, |(a, b)| (a - b).norm());
-                let limit = JUMP_M + FASTEST_M_PER_S * (times[i] - times[i - 1]);
+                let limit = rules.jump_m + rules.fastest_m_per_s * (times[i] - times[i - 1]);
                 // Just between these two, not next to it.
                 let here = (places[i] - places[i - 1]).norm() > limit;
                 number += usize::from(here && jump > limit);
@@ -134,10 +127,11 @@ pub(crate) fn stretches(times: &[f64], places: &[Point]) -> Vec<usize> {
 }
 
 /// A bell of samples that belong, with a share astray, against an exponential of those that do not.
-fn log_odds(distance: f64, std: f64, free_m: f64) -> f64 {
+fn log_odds(distance: f64, std: f64, free_m: f64, config: &config::Hands) -> f64 {
+    let astray = config.contact.astray_share;
     let free = (-distance / free_m).exp() / free_m;
     let bell = 2.0 * (-0.5 * (distance / std).powi(2)).exp() / (std * std::f64::consts::TAU.sqrt());
-    (((1.0 - ASTRAY) * bell + ASTRAY * free) / free).ln()
+    (((1.0 - astray) * bell + astray * free) / free).ln()
 }
 
 /// Coordinate-wise median.
@@ -167,15 +161,16 @@ impl Shape {
     }
 
     /// The arc that most samples lie on.
-    fn arc(places: &[Point]) -> Option<Self> {
+    fn arc(places: &[Point], radii_m: [f64; 2]) -> Option<Self> {
         trimmed(places, |kept| {
             let plane = Plane::fit(kept)?;
             let origin = centroid(kept)?;
+            // Geometry: an axis of the world that the normal does not lie along.
             let across = if plane.normal.x.abs() < 0.8 { crate::math::Vector::x() } else { crate::math::Vector::y() };
             let first = crate::math::unit(&plane.normal.cross(&across))?;
             let axes = [first, plane.normal.cross(&first)];
             let flat: Vec<Point2<f64>> = kept.iter().map(|p| on(&axes, &origin, p)).collect();
-            let circle = circle::fit(&flat).filter(|c| (RADII_M[0]..RADII_M[1]).contains(&c.radius))?;
+            let circle = circle::fit(&flat).filter(|c| (radii_m[0]..radii_m[1]).contains(&c.radius))?;
             Some(Self::Arc { plane, axes, origin, circle })
         })
     }
@@ -234,7 +229,7 @@ mod tests {
     #[test]
     fn the_samples_of_a_hold_lie_on_its_arc_and_reaching_does_not() {
         let (_, places) = way();
-        let nats = on_path(&places, 6, 33, 0.005).unwrap();
+        let nats = on_path(&places, [6, 33], 0.005, &config::Hands::default()).unwrap();
         assert!(nats[9..31].iter().all(|n| *n > 0.0), "{nats:?}");
         assert!(nats[0..5].iter().chain(&nats[36..]).all(|n| *n < 0.0), "{nats:?}");
     }
@@ -242,9 +237,9 @@ mod tests {
     #[test]
     fn a_hand_rests_where_it_takes_hold_and_where_it_lets_go() {
         let (times, places) = way();
-        let tremble = tremble_m([(times.as_slice(), places.as_slice())].into_iter());
+        let tremble = tremble_m([(times.as_slice(), places.as_slice())].into_iter(), &config::Hands::default());
         assert!((0.002..0.02).contains(&tremble), "{tremble}");
-        let nats = rests(&times, &places, tremble);
+        let nats = rests(&times, &places, tremble, &config::Hands::default());
         assert!(nats[8][0] > 0.5 && nats[4][0] < 0.0, "{nats:?}");
         assert!(nats[31][1] > 0.5 && nats[35][1] < 0.0, "{nats:?}");
     }
@@ -254,8 +249,8 @@ mod tests {
         let times: Vec<f64> = (0..12).map(|i| i as f64 / 12.0).collect();
         let mut places = vec![Point::origin(); 12];
         places[3].x = 2.0;
-        assert_eq!(stretches(&times, &places), [0; 12]);
+        assert_eq!(stretches(&times, &places, &config::Hands::default()), [0; 12]);
         places[6..].iter_mut().for_each(|p| p.y = 1.7);
-        assert_eq!(stretches(&times, &places), [0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1]);
+        assert_eq!(stretches(&times, &places, &config::Hands::default()), [0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1]);
     }
 }

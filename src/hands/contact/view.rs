@@ -1,13 +1,13 @@
 //! What a frame's depth shows around a place, without hands.
 
-use super::REACH_M;
+use crate::config;
 use crate::error::Result;
-use crate::math::Point;
-use crate::recording::{Frame, Grid, HAND_CLASS, HandSample, Recording};
+use crate::math::{Point, segment_distance};
+use crate::recording::{Camera, Frame, Grid, HAND_CLASS, HandSample, Recording};
 
 /// A frame's depth without hands.
 pub(crate) struct View<'a> {
-    recording: &'a Recording,
+    camera: &'a Camera,
     frame: &'a Frame,
     depth: Grid<f32>,
     mask: Option<Grid<u8>>,
@@ -19,28 +19,26 @@ pub(crate) struct View<'a> {
 
 impl<'a> View<'a> {
     /// `None` where the frame has no depth of its own.
-    pub(crate) fn of(recording: &'a Recording, index: usize) -> Result<Option<Self>> {
+    pub(crate) fn of(recording: &'a Recording, index: usize, config: &config::Contact) -> Result<Option<Self>> {
         let Some(frame) = recording.frames.get(index).filter(|f| f.files.depth.is_some()) else { return Ok(None) };
         let Some(depth) = recording.depth(index)? else { return Ok(None) };
         let mask = recording.mask(index)?;
-        // Four pixels of 640: what segmenters smear.
-        let rim = ((recording.camera.width as f64 / 160.0).round() as isize).max(1);
-        let mut view = Self { recording, frame, depth, mask, bones: Vec::new(), rim };
+        let camera = recording.camera_of(index);
+        let rim = ((camera.width as f64 / config.mask_rims).round() as isize).max(1);
+        let mut view = Self { camera, frame, depth, mask, bones: Vec::new(), rim };
         for hand in recording.hands_in(index, index) {
-            view.bones.extend(view.missed_bones(hand));
+            view.bones.extend(view.missed_bones(hand, config.finger_half_m));
         }
         Ok(Some(view))
     }
 
     /// A hand's bones where the mask does not show the hand.
-    fn missed_bones(&self, hand: &HandSample) -> Vec<([f64; 2], [f64; 2], f64)> {
-        /// Half of a finger's breadth and what a tracked hand is off sideways, metres.
-        const HALF_WIDTH_M: f64 = 0.03;
+    fn missed_bones(&self, hand: &HandSample, half_width_m: f64) -> Vec<([f64; 2], [f64; 2], f64)> {
         let camera_from_world = self.frame.world_from_camera.inverse();
-        let camera = &self.recording.camera;
+        let camera = self.camera;
         let on_image = |p: &Point| {
             let local = camera_from_world * p;
-            camera.project(&local).map(|(u, v)| ([u, v], HALF_WIDTH_M * camera.fx / local.z))
+            camera.project(&local).map(|(u, v)| ([u, v], half_width_m * camera.fx / local.z))
         };
         let points = hand.skeleton();
         let seen: Vec<[f64; 2]> = points.iter().filter_map(|p| on_image(p).map(|(uv, _)| uv)).collect();
@@ -74,31 +72,22 @@ impl<'a> View<'a> {
     }
 
     fn is_hand(&self, u: f64, v: f64) -> bool {
-        self.is_masked(u, v)
-            || self.bones.iter().any(|(a, b, wide)| {
-                let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
-                let length = dx * dx + dy * dy;
-                let along = if length > 0.0 { ((u - a[0]) * dx + (v - a[1]) * dy) / length } else { 0.0 };
-                let s = along.clamp(0.0, 1.0);
-                (u - a[0] - s * dx).hypot(v - a[1] - s * dy) < *wide
-            })
+        self.is_masked(u, v) || self.bones.iter().any(|(a, b, wide)| segment_distance([u, v], *a, *b) < *wide)
     }
 
-    /// Distance to the nearest surface that is not a hand, at most [`REACH_M`]; `None` where the place is not in view.
-    pub(crate) fn nearest_m(&self, place: &Point) -> Option<f64> {
-        /// Surfaces are sampled this finely, metres.
-        const STEP_M: f64 = 0.012;
-        let camera = &self.recording.camera;
+    /// Distance to the nearest surface that is not a hand, at most `contact.reach_m`; `None` where the place is not in view.
+    pub(crate) fn nearest_m(&self, place: &Point, config: &config::Contact) -> Option<f64> {
+        let camera = self.camera;
         let local = self.frame.world_from_camera.inverse() * place;
         let (u, v) = camera.project(&local).filter(|(u, v)| camera.contains(*u, *v))?;
         let pixels_per_m = camera.fx / local.z;
-        let step = ((STEP_M * pixels_per_m) as usize).max(1);
-        let reach = REACH_M * pixels_per_m;
+        let step = ((config.surface_step_m * pixels_per_m) as usize).max(1);
+        let reach = config.reach_m * pixels_per_m;
         let range = |c: f64, size: usize| {
             let (low, high) = ((c - reach).max(0.0) as usize, (c + reach).max(0.0) as usize);
             (low / step * step..(high + 1).min(size)).step_by(step)
         };
-        let mut best = REACH_M;
+        let mut best = config.reach_m;
         for y in range(v, self.depth.height) {
             for x in range(u, self.depth.width) {
                 let z = f64::from(self.depth.data[y * self.depth.width + x]);
@@ -116,15 +105,13 @@ impl<'a> View<'a> {
 
     /// Depth of this view's surfaces around a place as the other view sees it there, and as it has to be there, metres along the
     /// other's axis. Without hands, and without what the other view does not show.
-    pub(crate) fn depth_against(&self, other: &View, place: &Point, reach_m: f64) -> Vec<(f64, f64)> {
-        /// Surfaces are sampled this finely, metres.
-        const STEP_M: f64 = 0.03;
-        let camera = &self.recording.camera;
+    pub(crate) fn depth_against(&self, other: &View, place: &Point, reach_m: f64, step_m: f64) -> Vec<(f64, f64)> {
+        let camera = self.camera;
         let local = self.frame.world_from_camera.inverse() * place;
         if local.z < 0.1 {
             return Vec::new();
         }
-        let step = ((STEP_M * camera.fx / local.z) as usize).max(1);
+        let step = ((step_m * camera.fx / local.z) as usize).max(1);
         let other_from_own = other.frame.world_from_camera.inverse() * self.frame.world_from_camera;
         let mut pairs = Vec::new();
         for y in (0..self.depth.height).step_by(step) {
@@ -138,7 +125,7 @@ impl<'a> View<'a> {
                     continue;
                 }
                 let there = other_from_own * point;
-                let pixel = camera.project(&there).filter(|(u, v)| camera.contains(*u, *v));
+                let pixel = other.camera.project(&there).filter(|(u, v)| other.camera.contains(*u, *v));
                 let Some((u, v)) = pixel.filter(|(u, v)| !other.is_hand(*u, *v)) else { continue };
                 pairs.extend(other.depth.nearest(u, v).filter(|z| *z > 0.0).map(|z| (f64::from(z), there.z)));
             }

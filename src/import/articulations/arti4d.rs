@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use serde::Deserialize;
 use serde_json::Value;
 
+use super::found::{FoundJoint, JointScene, JointSource, StatedJoint, kind_of};
 use super::yaml::{self, Yaml};
-use super::{Joint, Said, Scene, Source, kind_of};
 use crate::error::Result;
 
 #[derive(Deserialize)]
-struct Object {
+struct Arti4dObject {
     position: [f64; 3],
     axis: [f64; 3],
     #[serde(rename = "type", alias = "joint_type", alias = "axis_type")]
@@ -23,13 +23,13 @@ pub(super) fn detect(value: &Value) -> bool {
 }
 
 /// The file of types: the user's, else in the file's folder or one of the two above (SCENE/SEQUENCE/SEQUENCE.json).
-fn types_file(source: &Source<'_>) -> Option<PathBuf> {
+fn types_file(source: &JointSource<'_>) -> Option<PathBuf> {
     let mut above = source.path.ancestors().skip(1).take(3).map(|folder| folder.join("metadata.yaml"));
     source.options.types.clone().or_else(|| above.find(|p| p.is_file()))
 }
 
-pub(super) fn read(source: &Source<'_>) -> Result<Scene> {
-    let mut scene = Scene::empty(source.path, "arti4d");
+pub(super) fn read(source: &JointSource<'_>) -> Result<JointScene> {
+    let mut scene = JointScene::empty(source.path, "arti4d");
     let Some(objects) = source.value.as_object() else {
         return Err(source.fault("the whole file", "an object with a key for each object is wanted"));
     };
@@ -50,8 +50,8 @@ fn listed<'a>(types: &'a Yaml, name: &str) -> Option<&'a str> {
     entry.text().or_else(|| entry.find_like("type")?.text())
 }
 
-fn joint(name: &str, value: &Value, listed: Option<&str>) -> std::result::Result<Joint, String> {
-    let object: Object = Source::entry(value)?;
+fn joint(name: &str, value: &Value, listed: Option<&str>) -> std::result::Result<FoundJoint, String> {
+    let object: Arti4dObject = JointSource::entry(value)?;
     let Some(kind) = object.kind.or_else(|| listed.map(str::to_owned)) else {
         return Err(format!(
             "type: nothing tells whether it is a hinge or a slide; give metadata.yaml (--types FILE), or \"type\": \
@@ -59,5 +59,5 @@ fn joint(name: &str, value: &Value, listed: Option<&str>) -> std::result::Result
         ));
     };
     kind_of(&kind)?;
-    Said { label: name.to_owned(), kind, axis: object.axis, origin: object.position, range: None }.joint()
+    StatedJoint { label: name.to_owned(), kind, axis: object.axis, origin: object.position, range: None }.joint()
 }

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::{Joint, Said, Scene, Source};
+use super::found::{FoundJoint, JointScene, JointSource, StatedJoint};
 use crate::error::Result;
 use crate::math::Vector;
 
@@ -24,20 +24,20 @@ pub(super) fn detect(value: &Value) -> bool {
     ["axis", "joint_type", "center"].iter().all(|key| value.get(key).is_some())
 }
 
-pub(super) fn read(source: &Source<'_>) -> Result<Scene> {
-    let mut scene = Scene::empty(source.path, "artipoint");
+pub(super) fn read(source: &JointSource<'_>) -> Result<JointScene> {
+    let mut scene = JointScene::empty(source.path, "artipoint");
     scene.notes.push("what the hand did is taken for opening, from closed: ArtiPoint tells neither".to_owned());
     let folder = source.path.parent().and_then(|p| p.file_name()).map(|n| n.to_string_lossy().into_owned());
-    let own = super::stem(source.path);
+    let own = super::found::stem(source.path);
     // All files have one name; the folders tell them apart.
     let name = folder.filter(|f| own == "axis_info" && !f.is_empty()).unwrap_or(own);
-    let joint = Source::entry::<AxisInfo>(source.value).and_then(|info| joint(&name, &info));
+    let joint = JointSource::entry::<AxisInfo>(source.value).and_then(|info| joint(&name, &info));
     scene.take(name, joint);
     Ok(scene)
 }
 
-fn joint(name: &str, info: &AxisInfo) -> std::result::Result<Joint, String> {
-    let joint = Said {
+fn joint(name: &str, info: &AxisInfo) -> std::result::Result<FoundJoint, String> {
+    let joint = StatedJoint {
         label: name.to_owned(),
         kind: info.joint_type.clone(),
         axis: info.axis,
@@ -50,7 +50,7 @@ fn joint(name: &str, info: &AxisInfo) -> std::result::Result<Joint, String> {
         _ => name.to_owned(),
     };
     let range = range(info, joint.kind == crate::articulation::JointKind::Revolute)?;
-    Ok(Joint { id: name.to_owned(), label, range, ..joint })
+    Ok(FoundJoint { id: name.to_owned(), label, range, ..joint })
 }
 
 /// The opening that the hand went through, rad or m.

@@ -6,7 +6,8 @@ use std::path::Path;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::{Joint, Said, Scene, Source, shape};
+use super::found::{FoundJoint, JointScene, JointSource, StatedJoint};
+use super::shape;
 use crate::error::Result;
 use crate::import::blob;
 use crate::import::text::Lines;
@@ -14,16 +15,16 @@ use crate::json;
 use crate::math::{Point, Vector};
 
 #[derive(Deserialize)]
-struct Link {
+struct MobilityLink {
     id: i64,
     joint: String,
     name: Option<String>,
     #[serde(default)]
-    parts: Vec<Leaf>,
+    parts: Vec<MobilityPart>,
 }
 
 #[derive(Deserialize)]
-struct Leaf {
+struct MobilityPart {
     id: i64,
 }
 
@@ -65,8 +66,8 @@ pub(super) fn detect(value: &Value) -> bool {
     first.is_some_and(|link| link.get("joint").is_some() && link.get("jointData").is_some())
 }
 
-pub(super) fn read(source: &Source<'_>) -> Result<Scene> {
-    let mut scene = Scene::empty(source.path, "mobility");
+pub(super) fn read(source: &JointSource<'_>) -> Result<JointScene> {
+    let mut scene = JointScene::empty(source.path, "mobility");
     let folder = source.path.parent().and_then(|p| p.file_name()).map(|n| n.to_string_lossy().into_owned());
     scene.name = folder.unwrap_or(scene.name);
     // Meshes and axes are as ShapeNet has them.
@@ -79,7 +80,7 @@ pub(super) fn read(source: &Source<'_>) -> Result<Scene> {
         None => scene.notes.push("without result.json and textured_objs beside it parts have no boxes".to_owned()),
     }
     for (i, value) in source.list(&[])?.iter().enumerate() {
-        let link: Link = match Source::entry(value) {
+        let link: MobilityLink = match JointSource::entry(value) {
             Ok(link) => link,
             Err(reason) => {
                 scene.take(format!("[{i}]"), Err(reason));
@@ -110,8 +111,8 @@ fn named(node: &Value, above: &[i64], objs: &mut BTreeMap<i64, Vec<String>>) {
     }
 }
 
-fn joint(link: &Link, value: &Value, notes: &mut Vec<String>) -> std::result::Result<Joint, String> {
-    let JointData { axis, limit } = Source::entry::<Data>(value)?.data;
+fn joint(link: &MobilityLink, value: &Value, notes: &mut Vec<String>) -> std::result::Result<FoundJoint, String> {
+    let JointData { axis, limit } = JointSource::entry::<Data>(value)?.data;
     let label = format!("{}_{}", link.name.as_deref().unwrap_or("part"), link.id);
     let kind = link.joint.trim_end_matches('+');
     if kind != link.joint {
@@ -122,16 +123,16 @@ fn joint(link: &Link, value: &Value, notes: &mut Vec<String>) -> std::result::Re
         (Some(a), Some(b)) if !limit.no_limit => Some([a.min(b) * unit, a.max(b) * unit]),
         _ => None,
     };
-    Said { label, kind: kind.to_owned(), axis: axis.direction, origin: axis.origin, range }.joint()
+    StatedJoint { label, kind: kind.to_owned(), axis: axis.direction, origin: axis.origin, range }.joint()
 }
 
 /// The joint with the box around its part's meshes.
 fn with_shape(
-    joint: Joint,
-    link: &Link,
-    source: &Source<'_>,
+    joint: FoundJoint,
+    link: &MobilityLink,
+    source: &JointSource<'_>,
     objs: &BTreeMap<i64, Vec<String>>,
-) -> std::result::Result<Joint, String> {
+) -> std::result::Result<FoundJoint, String> {
     let folder = source.path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut points = Vec::new();
     for name in link.parts.iter().filter_map(|leaf| objs.get(&leaf.id)).flatten() {
@@ -140,7 +141,7 @@ fn with_shape(
             vertices(&file, &mut points).map_err(|e| e.to_string())?;
         }
     }
-    Ok(Joint { part: shape::around(&points, &joint.axis), ..joint })
+    Ok(FoundJoint { part: shape::around(&points, &joint.axis), ..joint })
 }
 
 /// Adds the vertices of an OBJ file.

@@ -1,11 +1,12 @@
 //! Joints of other data sets and programs: a truth to measure against, or joints to build and to replay.
 //!
-//! A reader turns one JSON file into a [`Scene`]: metres and radians in the file's own frame, unit axes. What is wrong with
-//! one joint costs that joint, with place and reason ([`Scene::left_out`]); an error is what makes the file unusable.
+//! A reader turns one JSON file into a [`JointScene`]: metres and radians in the file's own frame, unit axes. What is wrong with
+//! one joint costs that joint, with place and reason ([`JointScene::left_out`]); an error is what makes the file unusable.
 //! Formats are told from what files hold.
 
 mod arti4d;
 mod artipoint;
+mod found;
 mod mobility;
 mod multiscan;
 mod ours;
@@ -15,109 +16,19 @@ pub mod shape;
 mod stk;
 mod yaml;
 
-use std::collections::BTreeSet;
+pub use found::{FoundJoint, JointOptions, JointScene, JointSource, UnusableJoint};
+
 use std::path::{Path, PathBuf};
 
-use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::{blob, ply};
-use crate::articulation::{Articulation, JointKind};
+use super::blob;
 use crate::error::{Error, Result};
 use crate::json;
-use crate::math::{Point, Vector, unit};
-use shape::PartBox;
-
-/// A joint as another program tells it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Joint {
-    /// Its name, unique in the scene: letters, digits and `_`.
-    pub id: String,
-    /// Its name in the file.
-    pub label: String,
-    /// Motion type.
-    pub kind: JointKind,
-    /// Unit axis; whether positive opens is as good as the file.
-    pub axis: Vector,
-    /// The file's origin: a point on the hinge, any point of a slide.
-    pub origin: Point,
-    /// Lower and upper limit along the axis, rad or m, 0 is closed; `None` where the file has none.
-    pub range: Option<[f64; 2]>,
-    /// Box around the moving part, closed.
-    pub part: Option<PartBox>,
-    /// Box around the furniture.
-    pub base: Option<PartBox>,
-    /// Where a hand holds it, closed.
-    pub handle: Option<Point>,
-    /// The part as points of the scene's reconstruction, by number, rising; `None` where the file has no such thing.
-    pub points: Option<Vec<usize>>,
-    /// How sure its program is, from 0 to 1.
-    pub score: Option<f64>,
-}
-
-impl Joint {
-    /// Type, axis and origin.
-    #[must_use]
-    pub fn articulation(&self) -> Articulation {
-        Articulation { kind: self.kind, axis: self.axis, origin: self.origin }
-    }
-
-    /// The part's middle, else its handle, else the origin.
-    #[must_use]
-    pub fn place(&self) -> Point {
-        self.part.map(|b| b.center).or(self.handle).unwrap_or(self.origin)
-    }
-}
-
-/// A joint that cannot be used.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LeftOut {
-    /// Where it stands in its file.
-    pub place: String,
-    /// Why.
-    pub reason: String,
-}
-
-/// The joints of a file, or of a folder.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Scene {
-    /// The file's or folder's name.
-    pub name: String,
-    /// The format's name.
-    pub format: &'static str,
-    /// Up in the file's frame.
-    pub up: Vector,
-    /// The joints.
-    pub joints: Vec<Joint>,
-    /// What could not be used.
-    pub left_out: Vec<LeftOut>,
-    /// What was taken for granted.
-    pub notes: Vec<String>,
-}
-
-/// What a user says beside the file.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Options {
-    /// The reconstruction whose points the file counts (PLY), where it is not beside it.
-    pub points: Option<PathBuf>,
-    /// Arti4D's `metadata.yaml`, where it is in none of the folders above.
-    pub types: Option<PathBuf>,
-}
-
-/// A file to be read.
-#[derive(Debug)]
-pub struct Source<'a> {
-    /// Its path.
-    pub path: &'a Path,
-    /// What it holds.
-    pub value: &'a Value,
-    /// What the user says.
-    pub options: &'a Options,
-}
 
 /// A format.
 #[derive(Clone, Copy)]
-pub struct Format {
+pub struct JointFormat {
     /// Its name on the command line.
     pub name: &'static str,
     /// What it is, for people.
@@ -125,49 +36,49 @@ pub struct Format {
     /// Whether a file holds it.
     pub detect: fn(&Value) -> bool,
     /// Reads a file.
-    pub read: fn(&Source<'_>) -> Result<Scene>,
+    pub read: fn(&JointSource<'_>) -> Result<JointScene>,
 }
 
 /// All formats. Where several fit, the first one is taken.
-pub const ALL: &[Format] = &[
-    Format {
+pub const ALL: &[JointFormat] = &[
+    JointFormat {
         name: "paws",
         title: "joints.json, articulations.json, twin.json",
         detect: ours::detect,
         read: ours::read,
     },
-    Format {
+    JointFormat {
         name: "artipoint",
         title: "ArtiPoint, axis_info.json or the folder of its segments",
         detect: artipoint::detect,
         read: artipoint::read,
     },
-    Format {
+    JointFormat {
         name: "multiscan",
         title: "MultiScan, SCAN.annotations.json (parts from SCAN.ply)",
         detect: multiscan::detect,
         read: multiscan::read,
     },
-    Format {
+    JointFormat {
         name: "scenefun3d",
         title: "SceneFun3D, VISIT_motions.json (with VISIT_laser_scan.ply)",
         detect: scenefun3d::detect,
         read: scenefun3d::read,
     },
-    Format {
+    JointFormat {
         name: "articulate3d",
         title: "Articulate3D, USDNet, S2O: SCENE_articulation.json, MODEL.art-stk.json",
         detect: stk::detect,
         read: stk::read,
     },
-    Format {
+    JointFormat {
         name: "mobility",
         title: "PartNet-Mobility, mobility_v2.json (parts from result.json and textured_objs)",
         detect: mobility::detect,
         read: mobility::read,
     },
-    Format { name: "s2o", title: "S2O's and OPD's predicted motions", detect: s2o::detect, read: s2o::read },
-    Format {
+    JointFormat { name: "s2o", title: "S2O's and OPD's predicted motions", detect: s2o::detect, read: s2o::read },
+    JointFormat {
         name: "arti4d",
         title: "Arti4D, SEQUENCE.json (types from metadata.yaml)",
         detect: arti4d::detect,
@@ -185,7 +96,7 @@ pub fn names() -> String {
 ///
 /// # Errors
 /// Where there is none, with those that are.
-pub fn named(name: &str) -> Result<&'static Format> {
+pub fn named(name: &str) -> Result<&'static JointFormat> {
     ALL.iter()
         .find(|f| f.name == name)
         .ok_or_else(|| Error::Config(format!("\"{name}\" is no format of joints; there are {}", names())))
@@ -193,7 +104,7 @@ pub fn named(name: &str) -> Result<&'static Format> {
 
 /// The format that a file's content has.
 #[must_use]
-pub fn detect(value: &Value) -> Option<&'static Format> {
+pub fn detect(value: &Value) -> Option<&'static JointFormat> {
     ALL.iter().find(|f| (f.detect)(value))
 }
 
@@ -229,7 +140,7 @@ pub fn holds(path: &Path) -> bool {
 ///
 /// # Errors
 /// Where nothing can be read, no format fits, or no joint can be used.
-pub fn read(path: &Path, format: Option<&str>, options: &Options) -> Result<Scene> {
+pub fn read(path: &Path, format: Option<&str>, options: &JointOptions) -> Result<JointScene> {
     let forced = format.map(named).transpose()?;
     let mut values = Vec::new();
     let mut broken = Vec::new();
@@ -237,7 +148,7 @@ pub fn read(path: &Path, format: Option<&str>, options: &Options) -> Result<Scen
         for file in files(path) {
             match json::read::<Value>(&file) {
                 Ok(value) => values.push((file, value)),
-                Err(error) => broken.push(LeftOut { place: shown(&file), reason: error.to_string() }),
+                Err(error) => broken.push(UnusableJoint { place: shown(&file), reason: error.to_string() }),
             }
         }
     } else {
@@ -252,10 +163,10 @@ pub fn read(path: &Path, format: Option<&str>, options: &Options) -> Result<Scen
     if path.is_dir() {
         values.retain(|(_, value)| (format.detect)(value));
     }
-    let mut scene = Scene::empty(path, format.name);
+    let mut scene = JointScene::empty(path, format.name);
     scene.left_out = broken;
     for (file, value) in &values {
-        let one = (format.read)(&Source { path: file, value, options })?;
+        let one = (format.read)(&JointSource { path: file, value, options })?;
         scene.up = one.up;
         if path.is_file() {
             scene.name.clone_from(&one.name);
@@ -282,205 +193,4 @@ pub fn read(path: &Path, format: Option<&str>, options: &Options) -> Result<Scen
 /// A file's name, for people.
 fn shown(path: &Path) -> String {
     path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
-}
-
-/// A file's name without its ending.
-fn stem(path: &Path) -> String {
-    path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
-}
-
-impl Scene {
-    /// Without joints.
-    fn empty(path: &Path, format: &'static str) -> Self {
-        Self { name: stem(path), format, up: Vector::z(), joints: Vec::new(), left_out: Vec::new(), notes: Vec::new() }
-    }
-
-    /// Takes a joint, or why there is none.
-    fn take(&mut self, place: String, joint: std::result::Result<Joint, String>) {
-        match joint {
-            Ok(joint) => self.joints.push(joint),
-            Err(reason) => self.left_out.push(LeftOut { place, reason }),
-        }
-    }
-
-    /// Gives each joint a name of its own that every format takes.
-    fn name_joints(&mut self) {
-        let mut taken = BTreeSet::new();
-        for joint in &mut self.joints {
-            let wanted = safe(if joint.id.is_empty() { &joint.label } else { &joint.id });
-            let mut id = wanted.clone();
-            let mut number = 2;
-            while !taken.insert(id.clone()) {
-                id = format!("{wanted}_{number}");
-                number += 1;
-            }
-            joint.id = id;
-        }
-    }
-}
-
-/// A name of letters, digits and `_` that begins with no digit.
-fn safe(name: &str) -> String {
-    let clean: String =
-        name.chars().take(64).map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '_' }).collect();
-    match clean.chars().next() {
-        Some(c) if !c.is_ascii_digit() => clean,
-        _ => format!("joint_{clean}"),
-    }
-}
-
-impl Source<'_> {
-    /// Reads a value of the file into a type; the error is for [`Scene::left_out`].
-    fn entry<T: DeserializeOwned>(value: &Value) -> std::result::Result<T, String> {
-        json::of_value(value)
-    }
-
-    /// An error at a place of the file.
-    fn fault(&self, place: &str, message: impl Into<String>) -> Error {
-        Error::format(self.path, place, message)
-    }
-
-    /// The list below some keys.
-    fn list(&self, keys: &[&str]) -> Result<&[Value]> {
-        let mut value = self.value;
-        for (i, key) in keys.iter().enumerate() {
-            value = value.get(key).ok_or_else(|| {
-                let place =
-                    if i == 0 { "the whole file".to_owned() } else { keys.get(..i).unwrap_or_default().join(".") };
-                self.fault(&place, format!("the key \"{key}\" is missing"))
-            })?;
-        }
-        let place = if keys.is_empty() { "the whole file".to_owned() } else { keys.join(".") };
-        value.as_array().map(Vec::as_slice).ok_or_else(|| self.fault(&place, "a list [...] is wanted"))
-    }
-
-    /// A file in the same folder.
-    fn beside(&self, name: &str) -> Option<PathBuf> {
-        let folder = self.path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        blob::inside(folder, name).ok().flatten().filter(|p| p.is_file())
-    }
-
-    /// The reconstruction: the user's, else the first of some files beside this one.
-    fn cloud(&self, names: &[String]) -> Result<Option<ply::Cloud>> {
-        let file = self.options.points.clone().or_else(|| names.iter().find_map(|n| self.beside(n)));
-        file.map(|f| ply::read(&f)).transpose()
-    }
-}
-
-/// What every format says of a joint, as it stands in the file.
-#[derive(Debug, Clone, Default)]
-struct Said {
-    /// Name.
-    label: String,
-    /// The word for the motion type.
-    kind: String,
-    axis: [f64; 3],
-    origin: [f64; 3],
-    /// Rad or m.
-    range: Option<[f64; 2]>,
-}
-
-impl Said {
-    /// The joint without its part.
-    fn joint(self) -> std::result::Result<Joint, String> {
-        let kind = kind_of(&self.kind)?;
-        let axis = unit(&Vector::from(self.axis)).ok_or_else(|| "axis: is no direction".to_owned())?;
-        let range = match self.range {
-            Some([low, high]) if low > high => {
-                return Err(format!("range: [{low}, {high}] is reversed: the lower limit comes first"));
-            }
-            Some([low, high]) if kind == JointKind::Revolute && high - low > std::f64::consts::TAU + 1e-6 => {
-                return Err(format!("range: {:.1} rad are more than a whole turn: are these degrees?", high - low));
-            }
-            // Annotators leave both limits where nobody set them.
-            Some([low, high]) if low == high => None,
-            other => other,
-        };
-        Ok(Joint {
-            id: String::new(),
-            label: self.label,
-            kind,
-            axis,
-            origin: Point::from(self.origin),
-            range,
-            part: None,
-            base: None,
-            handle: None,
-            points: None,
-            score: None,
-        })
-    }
-}
-
-/// The motion type of a word.
-fn kind_of(word: &str) -> std::result::Result<JointKind, String> {
-    const HINGES: [&str; 6] = ["revolute", "rotation", "rotational", "rot", "hinge", "continuous"];
-    const SLIDES: [&str; 6] = ["prismatic", "translation", "translational", "trans", "slider", "slide"];
-    let lower = word.trim().to_lowercase();
-    if HINGES.contains(&lower.as_str()) {
-        Ok(JointKind::Revolute)
-    } else if SLIDES.contains(&lower.as_str()) {
-        Ok(JointKind::Prismatic)
-    } else {
-        let word: String = word.chars().take(40).collect();
-        Err(format!("type: \"{word}\" is neither a hinge (revolute, rotation) nor a slide (prismatic, translation)"))
-    }
-}
-
-/// Points by their numbers; sorts the numbers.
-fn picked(cloud: &ply::Cloud, numbers: &mut Vec<usize>) -> std::result::Result<Vec<Point>, String> {
-    numbers.sort_unstable();
-    numbers.dedup();
-    let all = &cloud.points;
-    match numbers.last() {
-        None => Err("indices: there are none".to_owned()),
-        Some(last) if *last >= all.len() => {
-            Err(format!("indices: {last} is beyond the {} points of the reconstruction; is it another one?", all.len()))
-        }
-        Some(_) => Ok(numbers.iter().filter_map(|i| all.get(*i)).copied().collect()),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_become_safe_and_stay_apart() {
-        assert_eq!(
-            ["3", "wall cabinet.1:door", "", "ok_1"].map(safe),
-            ["joint_3", "wall_cabinet_1_door", "joint_", "ok_1"]
-        );
-        let joint = |label: &str| Said {
-            label: label.to_owned(),
-            kind: "rot".to_owned(),
-            axis: [0.0, 0.0, 2.0],
-            ..Said::default()
-        };
-        let mut scene = Scene::empty(Path::new("a/b.json"), "paws");
-        for label in ["a b", "a.b", "c"] {
-            scene.take(String::new(), joint(label).joint());
-        }
-        scene.name_joints();
-        let ids: Vec<&str> = scene.joints.iter().map(|j| j.id.as_str()).collect();
-        assert_eq!((ids, scene.name.as_str()), (vec!["a_b", "a_b_2", "c"], "b"));
-        assert_eq!(scene.joints[0].axis, Vector::z());
-    }
-
-    #[test]
-    fn what_no_joint_can_be_is_told() {
-        let good =
-            Said { kind: "rotation".to_owned(), axis: [0.0, 0.0, 1.0], range: Some([0.0, 1.5]), ..Said::default() };
-        assert!(good.clone().joint().is_ok());
-        for (said, words) in [
-            (Said { kind: "screw".to_owned(), ..good.clone() }, "type: \"screw\" is neither"),
-            (Said { axis: [0.0; 3], ..good.clone() }, "axis: is no direction"),
-            (Said { range: Some([1.0, 0.0]), ..good.clone() }, "reversed"),
-            (Said { range: Some([0.0, 90.0]), ..good.clone() }, "degrees"),
-        ] {
-            let reason = said.joint().unwrap_err();
-            assert!(reason.contains(words), "{reason}");
-        }
-        assert_eq!(Said { range: Some([0.0, 0.0]), ..good }.joint().unwrap().range, None);
-    }
 }

@@ -6,16 +6,16 @@ use nalgebra::Matrix3;
 use serde::Deserialize;
 use serde_json::Value;
 
+use super::found::{FoundJoint, JointScene, JointSource};
 use super::shape::{self, PartBox};
-use super::stk::Motion;
-use super::{Joint, Scene, Source};
+use super::stk::StkMotion;
 use crate::error::Result;
 use crate::import::ply::Cloud;
 use crate::math::{Point, Vector};
 
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
-struct Part {
+struct MultiScanPart {
     part_id: i64,
     #[serde(default)]
     label: String,
@@ -26,7 +26,7 @@ struct Part {
 
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
-struct Object {
+struct MultiScanObject {
     #[serde(default)]
     label: String,
     #[serde(default)]
@@ -62,20 +62,20 @@ pub(super) fn detect(value: &Value) -> bool {
     value.get("objects").is_some_and(Value::is_array) && (first || by_label)
 }
 
-pub(super) fn read(source: &Source<'_>) -> Result<Scene> {
-    let mut scene = Scene::empty(source.path, "multiscan");
+pub(super) fn read(source: &JointSource<'_>) -> Result<JointScene> {
+    let mut scene = JointScene::empty(source.path, "multiscan");
     scene.name = scene.name.trim_end_matches(".annotations").to_owned();
     if let Some(by_label) = source.value.get("articulations").and_then(Value::as_object) {
         for (label, motion) in by_label {
-            let joint = Source::entry::<Motion>(motion).and_then(|m| m.joint(label.clone()));
+            let joint = JointSource::entry::<StkMotion>(motion).and_then(|m| m.joint(label.clone()));
             scene.take(format!("articulations.{label}"), joint.map(|(joint, _)| joint));
         }
         scene.notes.push("this version of MultiScan's files does not tell which part a joint moves".to_owned());
         return Ok(scene);
     }
     let parts = parts(source, &mut scene)?;
-    let objects: Vec<Object> =
-        source.list(&["objects"])?.iter().filter_map(|o| Source::entry::<Object>(o).ok()).collect();
+    let objects: Vec<MultiScanObject> =
+        source.list(&["objects"])?.iter().filter_map(|o| JointSource::entry::<MultiScanObject>(o).ok()).collect();
     let cloud = source.cloud(&[format!("{}.ply", scene.name)])?;
     let points = match &cloud {
         Some(cloud) => points_of(&parts, cloud),
@@ -98,11 +98,11 @@ pub(super) fn read(source: &Source<'_>) -> Result<Scene> {
 }
 
 /// The parts; those that are none are left out.
-fn parts(source: &Source<'_>, scene: &mut Scene) -> Result<Vec<Part>> {
+fn parts(source: &JointSource<'_>, scene: &mut JointScene) -> Result<Vec<MultiScanPart>> {
     let mut parts = Vec::new();
     for (i, value) in source.list(&["parts"])?.iter().enumerate() {
         // Moved parts alone matter.
-        match Source::entry::<Part>(value) {
+        match JointSource::entry::<MultiScanPart>(value) {
             Ok(part) => parts.push(part),
             Err(reason) => scene.take(format!("parts[{i}]"), Err(reason)),
         }
@@ -111,11 +111,11 @@ fn parts(source: &Source<'_>, scene: &mut Scene) -> Result<Vec<Part>> {
 }
 
 fn joint(
-    part: &Part,
+    part: &MultiScanPart,
     motion: &Value,
-    objects: &[Object],
+    objects: &[MultiScanObject],
     moved: Option<(&Cloud, &Vec<usize>)>,
-) -> std::result::Result<Joint, String> {
+) -> std::result::Result<FoundJoint, String> {
     let object = objects.iter().find(|o| o.part_ids.contains(&part.part_id));
     let label = match object {
         Some(object) if !object.label.is_empty() && !part.label.contains(':') => {
@@ -123,7 +123,7 @@ fn joint(
         }
         _ => part.label.clone(),
     };
-    let motion: Motion = Source::entry(motion)?;
+    let motion: StkMotion = JointSource::entry(motion)?;
     let (joint, state) = motion.joint(label)?;
     // The scan shows the part as it stood; boxes are of closed parts.
     let part = moved.and_then(|(cloud, numbers)| {
@@ -131,12 +131,12 @@ fn joint(
         Some(shape::around(&points, &joint.axis)?.moved(&joint.articulation(), -state))
     });
     let base = object.and_then(|o| o.obb.as_ref()?.shape());
-    Ok(Joint { part, base, points: moved.map(|(_, numbers)| numbers.clone()), ..joint })
+    Ok(FoundJoint { part, base, points: moved.map(|(_, numbers)| numbers.clone()), ..joint })
 }
 
 /// The points of each part that has a joint, with what is fixed to it: a handle is the door's.
-fn points_of(parts: &[Part], cloud: &Cloud) -> BTreeMap<i64, Vec<usize>> {
-    let by_id: BTreeMap<i64, &Part> = parts.iter().map(|p| (p.part_id, p)).collect();
+fn points_of(parts: &[MultiScanPart], cloud: &Cloud) -> BTreeMap<i64, Vec<usize>> {
+    let by_id: BTreeMap<i64, &MultiScanPart> = parts.iter().map(|p| (p.part_id, p)).collect();
     let owner = |mut id: i64| {
         // No chain is longer than the list.
         for _ in 0..=parts.len() {

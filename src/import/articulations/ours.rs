@@ -4,13 +4,13 @@ use nalgebra::Matrix3;
 use serde::Deserialize;
 use serde_json::Value;
 
+use super::found::{FoundJoint, JointScene, JointSource, StatedJoint};
 use super::shape::PartBox;
-use super::{Joint, Said, Scene, Source};
 use crate::error::Result;
 use crate::math::{Point, Vector, unit};
 
 #[derive(Deserialize)]
-struct Entry {
+struct JointFileEntry {
     id: String,
     #[serde(rename = "type", alias = "kind")]
     kind: String,
@@ -44,7 +44,7 @@ impl BoxEntry {
 }
 
 #[derive(Deserialize)]
-struct Furniture {
+struct FurnitureEntry {
     part: TwinPart,
 }
 
@@ -83,8 +83,8 @@ pub(super) fn detect(value: &Value) -> bool {
     list("furniture") || (list("joints") && !is_truth(value))
 }
 
-pub(super) fn read(source: &Source<'_>) -> Result<Scene> {
-    let mut scene = Scene::empty(source.path, "paws");
+pub(super) fn read(source: &JointSource<'_>) -> Result<JointScene> {
+    let mut scene = JointScene::empty(source.path, "paws");
     if source.value.get("furniture").is_some() {
         for (i, value) in source.list(&["furniture"])?.iter().enumerate() {
             scene.take(format!("furniture[{i}]"), of_twin(value));
@@ -96,7 +96,9 @@ pub(super) fn read(source: &Source<'_>) -> Result<Scene> {
         Some("mm") => 0.001,
         _ => 1.0,
     };
-    if let Some(up) = source.value.get("up").and_then(|up| Source::entry::<Vector>(up).ok()).and_then(|up| unit(&up)) {
+    if let Some(up) =
+        source.value.get("up").and_then(|up| JointSource::entry::<Vector>(up).ok()).and_then(|up| unit(&up))
+    {
         scene.up = up;
     }
     for (i, value) in source.list(&["joints"])?.iter().enumerate() {
@@ -105,22 +107,22 @@ pub(super) fn read(source: &Source<'_>) -> Result<Scene> {
     Ok(scene)
 }
 
-fn of_entry(value: &Value, metres: f64) -> std::result::Result<Joint, String> {
-    let entry: Entry = Source::entry(value)?;
+fn of_entry(value: &Value, metres: f64) -> std::result::Result<FoundJoint, String> {
+    let entry: JointFileEntry = JointSource::entry(value)?;
     let long = |p: [f64; 3]| p.map(|x| x * metres);
     let range = entry.range.or(entry.observed_range.map(|upper| [0.0, upper]));
-    let slides = super::kind_of(&entry.kind)? == crate::articulation::JointKind::Prismatic;
+    let slides = super::found::kind_of(&entry.kind)? == crate::articulation::JointKind::Prismatic;
     let range = range.map(|r| if slides { r.map(|q| q * metres) } else { r });
-    let joint =
-        Said { label: entry.id, kind: entry.kind, axis: entry.axis, origin: long(entry.origin), range }.joint()?;
+    let joint = StatedJoint { label: entry.id, kind: entry.kind, axis: entry.axis, origin: long(entry.origin), range }
+        .joint()?;
     let part = entry.part_box.map(|b| BoxEntry { center: long(b.center), half: long(b.half), ..b }.shape());
     let handle = entry.handle.or(entry.grip).map(|p| Point::from(long(p)));
-    Ok(Joint { part, handle, score: entry.joint_probability, ..joint })
+    Ok(FoundJoint { part, handle, score: entry.joint_probability, ..joint })
 }
 
-fn of_twin(value: &Value) -> std::result::Result<Joint, String> {
-    let TwinPart { id, joint, bounds, handle } = Source::entry::<Furniture>(value)?.part;
+fn of_twin(value: &Value) -> std::result::Result<FoundJoint, String> {
+    let TwinPart { id, joint, bounds, handle } = JointSource::entry::<FurnitureEntry>(value)?.part;
     let Articulated { kind, axis, origin } = joint.articulation;
-    let said = Said { label: id, kind, axis, origin, range: Some([0.0, joint.upper]) }.joint()?;
-    Ok(Joint { part: Some(bounds.shape()), handle: Some(Point::from(handle)), score: joint.probability, ..said })
+    let said = StatedJoint { label: id, kind, axis, origin, range: Some([0.0, joint.upper]) }.joint()?;
+    Ok(FoundJoint { part: Some(bounds.shape()), handle: Some(Point::from(handle)), score: joint.probability, ..said })
 }

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::{Joint, Said, Scene, Source};
+use super::found::{FoundJoint, JointScene, JointSource, StatedJoint};
 use crate::error::Result;
 
 #[derive(Deserialize)]
@@ -34,8 +34,8 @@ pub(super) fn detect(value: &Value) -> bool {
     is_motion(value) || value.as_array().and_then(|list| list.first()).is_some_and(is_motion)
 }
 
-pub(super) fn read(source: &Source<'_>) -> Result<Scene> {
-    let mut scene = Scene::empty(source.path, "s2o");
+pub(super) fn read(source: &JointSource<'_>) -> Result<JointScene> {
+    let mut scene = JointScene::empty(source.path, "s2o");
     let name = scene.name.clone();
     let Some(list) = source.value.as_array() else {
         if let Some(joint) = joint(source.value, &name).transpose() {
@@ -57,9 +57,9 @@ pub(super) fn read(source: &Source<'_>) -> Result<Scene> {
 }
 
 /// `None` for parts that do not move.
-fn joint(value: &Value, name: &str) -> std::result::Result<Option<Joint>, String> {
+fn joint(value: &Value, name: &str) -> std::result::Result<Option<FoundJoint>, String> {
     if value.get("mtype").is_some() {
-        let short: Short = Source::entry(value)?;
+        let short: Short = JointSource::entry(value)?;
         let kind = match &short.mtype {
             Value::Number(n) if n.as_f64() == Some(0.0) => "revolute".to_owned(),
             Value::Number(n) if n.as_f64() == Some(1.0) => "prismatic".to_owned(),
@@ -70,16 +70,16 @@ fn joint(value: &Value, name: &str) -> std::result::Result<Option<Joint>, String
             Some(image) => format!("image {}, {name}", text(image)),
             None => name.to_owned(),
         };
-        let said = Said { label, kind, axis: short.maxis, origin: short.morigin, range: None };
-        return Ok(Some(Joint { score: short.score.filter(|s| s.is_finite()), ..said.joint()? }));
+        let said = StatedJoint { label, kind, axis: short.maxis, origin: short.morigin, range: None };
+        return Ok(Some(FoundJoint { score: short.score.filter(|s| s.is_finite()), ..said.joint()? }));
     }
-    let long: Long = Source::entry(value)?;
+    let long: Long = JointSource::entry(value)?;
     let Some(kind) = long.motion_type.filter(|kind| kind != "fixed") else { return Ok(None) };
     let axis = long.motion_axis.ok_or("motionAxis: is missing")?;
     let origin = long.motion_origin.ok_or("motionOrigin: is missing")?;
     let id = long.id.as_ref().map_or_else(|| name.to_owned(), text);
     let label = long.cat.map_or_else(|| id.clone(), |cat| format!("{cat} {id}"));
-    Said { label, kind, axis, origin, range: None }.joint().map(Some)
+    StatedJoint { label, kind, axis, origin, range: None }.joint().map(Some)
 }
 
 fn text(value: &Value) -> String {

@@ -6,14 +6,14 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::{Joint, Said, Scene, Source, picked};
+use super::found::{FoundJoint, JointScene, JointSource, StatedJoint, picked};
 use crate::error::Result;
 use crate::import::ply::Cloud;
 use crate::json;
 use crate::math::centroid;
 
 #[derive(Deserialize)]
-struct Motion {
+struct PartMotion {
     motion_id: Option<String>,
     annot_id: String,
     motion_type: String,
@@ -22,7 +22,7 @@ struct Motion {
 }
 
 #[derive(Deserialize)]
-struct Annotation {
+struct PartAnnotation {
     annot_id: String,
     #[serde(default)]
     indices: Vec<usize>,
@@ -34,8 +34,8 @@ pub(super) fn detect(value: &Value) -> bool {
     motions.is_some_and(|m| m.first().is_none_or(|first| first.get("motion_dir").is_some()))
 }
 
-pub(super) fn read(source: &Source<'_>) -> Result<Scene> {
-    let mut scene = Scene::empty(source.path, "scenefun3d");
+pub(super) fn read(source: &JointSource<'_>) -> Result<JointScene> {
+    let mut scene = JointScene::empty(source.path, "scenefun3d");
     let prefix = scene.name.trim_end_matches("motions").to_owned();
     scene.name = prefix.trim_end_matches('_').to_owned();
     let motions = source.list(&["motions"])?;
@@ -54,7 +54,11 @@ pub(super) fn read(source: &Source<'_>) -> Result<Scene> {
 }
 
 /// The annotated elements by their ids; none where the file is not there.
-fn annotations(source: &Source<'_>, prefix: &str, scene: &mut Scene) -> Result<BTreeMap<String, Annotation>> {
+fn annotations(
+    source: &JointSource<'_>,
+    prefix: &str,
+    scene: &mut JointScene,
+) -> Result<BTreeMap<String, PartAnnotation>> {
     let name = format!("{prefix}annotations.json");
     let Some(path) = source.beside(&name) else {
         scene.notes.push(format!("without {name} beside it nothing tells which points an element has"));
@@ -62,15 +66,19 @@ fn annotations(source: &Source<'_>, prefix: &str, scene: &mut Scene) -> Result<B
     };
     let value: Value = json::read(&path)?;
     let list = value.get("annotations").and_then(Value::as_array).map(Vec::as_slice).unwrap_or_default();
-    Ok(list.iter().filter_map(|a| Source::entry::<Annotation>(a).ok()).map(|a| (a.annot_id.clone(), a)).collect())
+    Ok(list
+        .iter()
+        .filter_map(|a| JointSource::entry::<PartAnnotation>(a).ok())
+        .map(|a| (a.annot_id.clone(), a))
+        .collect())
 }
 
 fn joint(
     value: &Value,
     cloud: &Cloud,
-    annotations: &BTreeMap<String, Annotation>,
-) -> std::result::Result<Joint, String> {
-    let motion: Motion = Source::entry(value)?;
+    annotations: &BTreeMap<String, PartAnnotation>,
+) -> std::result::Result<FoundJoint, String> {
+    let motion: PartMotion = JointSource::entry(value)?;
     let origin = cloud.points.get(motion.motion_origin_idx).ok_or_else(|| {
         format!(
             "motion_origin_idx: {} is beyond the {} points of the laser scan; is it another one?",
@@ -80,7 +88,7 @@ fn joint(
     })?;
     let element = annotations.get(&motion.annot_id);
     let label = element.and_then(|e| e.label.clone()).or(motion.motion_id).unwrap_or(motion.annot_id);
-    let mut joint = Said {
+    let mut joint = StatedJoint {
         label,
         kind: motion.motion_type,
         axis: motion.motion_dir,

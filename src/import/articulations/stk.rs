@@ -6,13 +6,14 @@
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::{Joint, Said, Scene, Source, picked, shape};
+use super::found::{FoundJoint, JointScene, JointSource, StatedJoint, picked};
+use super::shape;
 use crate::error::Result;
 use crate::import::ply::Cloud;
 
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct Motion {
+pub(super) struct StkMotion {
     #[serde(rename = "type")]
     kind: String,
     axis: [f64; 3],
@@ -23,11 +24,11 @@ pub(super) struct Motion {
     state: Option<f64>,
 }
 
-impl Motion {
+impl StkMotion {
     /// The joint, and how far it stands open in the scan, rad or m.
-    pub(super) fn joint(self, label: String) -> std::result::Result<(Joint, f64), String> {
+    pub(super) fn joint(self, label: String) -> std::result::Result<(FoundJoint, f64), String> {
         let range = self.range_min.zip(self.range_max).map(|(low, high)| [low, high]);
-        let joint = Said { label, kind: self.kind, axis: self.axis, origin: self.origin, range }.joint()?;
+        let joint = StatedJoint { label, kind: self.kind, axis: self.axis, origin: self.origin, range }.joint()?;
         Ok((joint, self.state.unwrap_or(0.0)))
     }
 }
@@ -54,10 +55,10 @@ pub(super) fn detect(value: &Value) -> bool {
     place(value).is_some()
 }
 
-pub(super) fn read(source: &Source<'_>) -> Result<Scene> {
+pub(super) fn read(source: &JointSource<'_>) -> Result<JointScene> {
     let keys = place(source.value).unwrap_or(PLACES[0]);
     let entries = source.list(keys)?;
-    let mut scene = Scene::empty(source.path, "articulate3d");
+    let mut scene = JointScene::empty(source.path, "articulate3d");
     scene.name = scene.name.trim_end_matches("_articulation").to_owned();
     let cloud = match entries.iter().any(|e| e.get("indices").is_some()) {
         true => source.cloud(&[format!("{}.ply", scene.name), "mesh_aligned_0.05.ply".to_owned()])?,
@@ -74,13 +75,13 @@ pub(super) fn read(source: &Source<'_>) -> Result<Scene> {
     Ok(scene)
 }
 
-fn joint(entry: &Value, cloud: Option<&Cloud>) -> std::result::Result<Joint, String> {
-    let about: About = Source::entry(entry)?;
+fn joint(entry: &Value, cloud: Option<&Cloud>) -> std::result::Result<FoundJoint, String> {
+    let about: About = JointSource::entry(entry)?;
     let pid = match &about.pid {
         Value::String(text) => text.clone(),
         other => other.to_string(),
     };
-    let motion: Motion = Source::entry(entry)?;
+    let motion: StkMotion = JointSource::entry(entry)?;
     let (mut joint, state) = motion.joint(about.label.unwrap_or(pid))?;
     if let Some(mut numbers) = about.indices {
         if let Some(cloud) = cloud {

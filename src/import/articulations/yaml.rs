@@ -49,7 +49,7 @@ impl Yaml {
 }
 
 /// A line: its depth in spaces, what follows.
-struct Line {
+struct YamlLine {
     depth: usize,
     text: String,
 }
@@ -61,7 +61,7 @@ struct Line {
 pub(super) fn read(path: &Path) -> Result<Yaml> {
     let blob = Blob::File(path.to_owned());
     let text = String::from_utf8(blob.read()?).map_err(|_| blob.fault("is not UTF-8 text"))?;
-    let lines: Vec<Line> = text.lines().filter_map(line).collect();
+    let lines: Vec<YamlLine> = text.lines().filter_map(line).collect();
     let mut next = 0;
     let value = block(&lines, &mut next, 0, 0);
     match lines.get(next) {
@@ -74,16 +74,16 @@ pub(super) fn read(path: &Path) -> Result<Yaml> {
 }
 
 /// A line without its comment; `None` where nothing is left.
-fn line(raw: &str) -> Option<Line> {
+fn line(raw: &str) -> Option<YamlLine> {
     let text = raw.trim_end();
     let content = text.trim_start_matches(' ');
     let depth = text.len() - content.len();
     let content = if content.starts_with('#') { "" } else { content.split(" #").next().unwrap_or_default().trim_end() };
-    (!content.is_empty() && content != "---").then(|| Line { depth, text: content.to_owned() })
+    (!content.is_empty() && content != "---").then(|| YamlLine { depth, text: content.to_owned() })
 }
 
 /// The lines from `next` on that stand at least at `depth`.
-fn block(lines: &[Line], next: &mut usize, depth: usize, level: usize) -> Yaml {
+fn block(lines: &[YamlLine], next: &mut usize, depth: usize, level: usize) -> Yaml {
     let Some(first) = lines.get(*next).filter(|l| l.depth >= depth && level < MAX_DEPTH) else {
         return Yaml::Text(String::new());
     };
@@ -109,7 +109,7 @@ fn block(lines: &[Line], next: &mut usize, depth: usize, level: usize) -> Yaml {
 }
 
 /// What stands deeper than a key; a list may stand as deep as its key.
-fn below(lines: &[Line], next: &mut usize, own: usize, level: usize) -> Yaml {
+fn below(lines: &[YamlLine], next: &mut usize, own: usize, level: usize) -> Yaml {
     let depth = match lines.get(*next) {
         Some(line) if line.depth == own && line.text.starts_with('-') => own,
         _ => own + 1,
@@ -118,7 +118,7 @@ fn below(lines: &[Line], next: &mut usize, own: usize, level: usize) -> Yaml {
 }
 
 /// An item of a list: a value, or the first entry of a map whose others follow deeper.
-fn item(lines: &[Line], next: &mut usize, own: usize, text: &str, level: usize) -> Yaml {
+fn item(lines: &[YamlLine], next: &mut usize, own: usize, text: &str, level: usize) -> Yaml {
     let Some((key, rest)) = entry(text) else {
         return if text.is_empty() { block(lines, next, own + 1, level + 1) } else { flow(text) };
     };
@@ -166,7 +166,7 @@ mod tests {
     use super::*;
 
     fn parsed(text: &str) -> Yaml {
-        let lines: Vec<Line> = text.lines().filter_map(line).collect();
+        let lines: Vec<YamlLine> = text.lines().filter_map(line).collect();
         block(&lines, &mut 0, 0, 0)
     }
 

@@ -7,14 +7,16 @@
 use std::path::{Path, PathBuf};
 
 use super::aria_camera::{self, Mounted};
-use super::aria_depth::{self, Seen};
-use super::aria_walk::{self, Rows, Walk};
+use super::aria_depth::{self, StereoImage};
+use super::aria_walk::{self, AriaWalk, RowsKept};
 use crate::error::{Error, Result};
 use crate::import::blob::{Blob, files};
-use crate::import::capture::{At, Capture, ImageAt, Missing, Picture, PoseAt, Poses, QuaternionOrder, Turn, World};
-use crate::import::join::Track;
-use crate::import::text::Table;
-use crate::import::{Options, axes, video};
+use crate::import::capture::{
+    At, Capture, ImageAt, ImageSource, Missing, PoseAt, Poses, QuaternionOrder, RawRotation, SourceWorld,
+};
+use crate::import::join::PoseTrack;
+use crate::import::text::TextTable;
+use crate::import::{ImportOptions, axes, video};
 use crate::math::{Pose, Vector};
 
 /// Folders that exporters put the colour images in.
@@ -50,13 +52,13 @@ pub(super) fn detect(path: &Path) -> bool {
     path.is_dir() && slam(path).is_some()
 }
 
-pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, options: &ImportOptions) -> Result<Capture> {
     let Some((slam, file)) = slam(path).and_then(|s| Some((s.clone(), trajectory(&s)?))) else {
         let message =
             "holds no slam/closed_loop_trajectory.csv nor open_loop_trajectory.csv; point at the folder that MPS wrote";
         return Err(Error::Io { path: path.to_owned(), message: message.to_owned() });
     };
-    let walk = aria_walk::trajectory(&file, Rows::Thinned)?;
+    let walk = aria_walk::trajectory(&file, RowsKept::Thinned)?;
     let mut notes = vec![format!(
         "{} of the glasses, poses about a hundredth of a second apart",
         file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
@@ -93,8 +95,9 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
         title: title.to_owned(),
         licence: (!stereo.is_empty()).then(|| "the pilot data set's is CC BY-NC 4.0".to_owned()),
         notes,
+        dropped: walk.dropped.into_iter().collect(),
         clock: Some(CLOCK.to_owned()),
-        world: World { up: walk.up, ..World::default() },
+        world: SourceWorld { up: walk.up, ..SourceWorld::default() },
         optics: Some(camera.optics),
         poses: Some(Poses { body_from_camera: Some(camera.device_from_camera), items: walk.items, ..Poses::default() }),
         images,
@@ -131,10 +134,10 @@ fn hand_file(path: &Path, slam: &Path) -> Option<PathBuf> {
 /// The images of the frames and their camera on the glasses: exported colour images, a video, else what depth was made from.
 fn cameras(
     path: &Path,
-    walk: &Walk,
+    walk: &AriaWalk,
     mounted: Option<Mounted>,
-    stereo: &[Seen],
-    options: &Options,
+    stereo: &[StereoImage],
+    options: &ImportOptions,
     notes: &mut Vec<String>,
 ) -> Result<(Vec<ImageAt>, Mounted)> {
     if let Some(mounted) = mounted {
@@ -173,13 +176,13 @@ fn cameras(
 }
 
 /// The stereo camera on the glasses, from the first image at whose time the trajectory is known.
-fn stereo_camera(walk: &Walk, stereo: &[Seen]) -> Option<Mounted> {
+fn stereo_camera(walk: &AriaWalk, stereo: &[StereoImage]) -> Option<Mounted> {
     let pose = |item: &PoseAt| {
-        let Turn::Quaternion(q) = item.pose.turn else { return None };
+        let RawRotation::Quaternion(q) = item.pose.turn else { return None };
         let turn = axes::quaternion(q, QuaternionOrder::Xyzw)?;
         Some((item.at.time_secs?, Pose::from_parts(Vector::from(item.pose.position).into(), turn)))
     };
-    let track = Track::of(walk.items.iter().filter_map(pose).collect());
+    let track = PoseTrack::of(walk.items.iter().filter_map(pose).collect());
     stereo.iter().find_map(|s| {
         let world_from_device = track.at(s.time_secs, 0.2)?;
         Some(Mounted { optics: s.optics, device_from_camera: world_from_device.inverse() * s.world_from_camera })
@@ -187,7 +190,7 @@ fn stereo_camera(walk: &Walk, stereo: &[Seen]) -> Option<Mounted> {
 }
 
 /// Colour images with times in their names, and their size; `None` where no folder has such.
-fn stills(path: &Path, walk: &Walk, notes: &mut Vec<String>) -> Option<(Vec<ImageAt>, [usize; 2])> {
+fn stills(path: &Path, walk: &AriaWalk, notes: &mut Vec<String>) -> Option<(Vec<ImageAt>, [usize; 2])> {
     let found = IMAGES.iter().map(|n| files(&path.join(n), &["jpg", "jpeg", "png"])).find(|f| !f.is_empty())?;
     let numbers: Vec<Option<f64>> = found.iter().map(|f| last_number(f)).collect();
     let [first, last] = walk.span()?;
@@ -208,7 +211,7 @@ fn stills(path: &Path, walk: &Walk, notes: &mut Vec<String>) -> Option<(Vec<Imag
     let image = |(file, number): (PathBuf, Option<f64>)| {
         let name = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let at = At::time(number? * unit).with_name(&name);
-        Some(ImageAt { at, picture: Picture::Still(Blob::File(file)), optics: None })
+        Some(ImageAt { at, picture: ImageSource::Still(Blob::File(file)), optics: None })
     };
     Some((found.into_iter().zip(numbers).filter_map(image).collect(), size))
 }
@@ -231,7 +234,7 @@ fn film(path: &Path) -> Result<Option<(PathBuf, Vec<f64>)>> {
 
 /// A table of `vrs_to_mp4`: seconds of the video and of the glasses, picture by picture.
 pub(super) fn device_times(path: &Path) -> Result<Vec<[f64; 2]>> {
-    let mut table = Table::open(path)?;
+    let mut table = TextTable::open(path)?;
     table.need(&["mp4_time_ns", "vrs_device_time_ns"])?;
     let mut out = Vec::new();
     while let Some(row) = table.row()? {
@@ -244,7 +247,7 @@ pub(super) fn device_times(path: &Path) -> Result<Vec<[f64; 2]>> {
 pub(super) fn pictures(file: &Path, times: &[f64]) -> Vec<ImageAt> {
     let image = |(index, time): (usize, &f64)| ImageAt {
         at: At::time(*time).with_index(index),
-        picture: Picture::Video { file: file.to_owned(), index, upright: true },
+        picture: ImageSource::Video { file: file.to_owned(), index, upright: true },
         optics: None,
     };
     times.iter().enumerate().map(image).collect()

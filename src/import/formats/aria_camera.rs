@@ -9,7 +9,7 @@ use serde_json::Value;
 use crate::error::{Error, Result};
 use crate::import::axes;
 use crate::import::capture::QuaternionOrder;
-use crate::import::optics::{Lens, Optics};
+use crate::import::optics::{LensModel, Optics};
 use crate::import::text::Lines;
 use crate::math::{Pose, Vector};
 
@@ -52,11 +52,11 @@ impl Mounted {
     pub fn upright(self) -> Self {
         let o = self.optics;
         let lens = match o.lens {
-            Lens::FisheyeRadTanThinPrism { k, p: [p0, p1], s: [s0, s1, s2, s3] } => {
-                Lens::FisheyeRadTanThinPrism { k, p: [-p1, p0], s: [-s2, -s3, s0, s1] }
+            LensModel::FisheyeRadTanThinPrism { k, p: [p0, p1], s: [s0, s1, s2, s3] } => {
+                LensModel::FisheyeRadTanThinPrism { k, p: [-p1, p0], s: [-s2, -s3, s0, s1] }
             }
-            Lens::OpenCv { k, p: [p1, p2] } => Lens::OpenCv { k, p: [p2, -p1] },
-            other @ (Lens::Pinhole | Lens::Fisheye { .. }) => other,
+            LensModel::OpenCv { k, p: [p1, p2] } => LensModel::OpenCv { k, p: [p2, -p1] },
+            other @ (LensModel::Pinhole | LensModel::Fisheye { .. }) => other,
         };
         let optics = Optics {
             width: o.height,
@@ -152,9 +152,9 @@ pub(super) fn projection(
     let name = model.split(':').next().unwrap_or_default();
     let key: String = name.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect();
     let ([fx, fy, cx, cy], lens) = match (key.as_str(), params) {
-        ("linear", [fx, fy, cx, cy]) => ([*fx, *fy, *cx, *cy], Lens::Pinhole),
+        ("linear", [fx, fy, cx, cy]) => ([*fx, *fy, *cx, *cy], LensModel::Pinhole),
         ("kannalabrandtk3", [fx, fy, cx, cy, k0, k1, k2, k3]) => {
-            ([*fx, *fy, *cx, *cy], Lens::Fisheye { k: [*k0, *k1, *k2, *k3] })
+            ([*fx, *fy, *cx, *cy], LensModel::Fisheye { k: [*k0, *k1, *k2, *k3] })
         }
         ("fisheyeradtanthinprism" | "fisheye624", [f, cx, cy, rest @ ..]) if rest.len() == 12 => {
             ([*f, *f, *cx, *cy], prism(rest))
@@ -176,9 +176,9 @@ pub(super) fn projection(
 }
 
 /// Six radial, two tangential and four thin prism coefficients; those that are not there are 0.
-fn prism(rest: &[f64]) -> Lens {
+fn prism(rest: &[f64]) -> LensModel {
     let at = |i: usize| rest.get(i).copied().unwrap_or(0.0);
-    Lens::FisheyeRadTanThinPrism {
+    LensModel::FisheyeRadTanThinPrism {
         k: std::array::from_fn(at),
         p: std::array::from_fn(|i| at(6 + i)),
         s: std::array::from_fn(|i| at(8 + i)),

@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::import::axes;
 use crate::import::blob::{Blob, inside};
 use crate::import::capture::{
-    Along, At, Depth, DepthAt, DepthCoding, ImageAt, Picture, QuaternionOrder, RawPose, Turn,
+    Along, At, Depth, DepthAt, DepthCoding, ImageAt, ImageSource, QuaternionOrder, RawPose, RawRotation,
 };
 use crate::import::decode;
 use crate::import::optics::Optics;
@@ -31,7 +31,7 @@ const SAME_SURFACE: f64 = 0.3;
 
 /// An image of the stereo camera.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Seen {
+pub(super) struct StereoImage {
     /// Seconds of the glasses' clock.
     pub time_secs: f64,
     /// The camera in the world.
@@ -44,7 +44,7 @@ pub(super) struct Seen {
     image: Option<PathBuf>,
 }
 
-impl Seen {
+impl StereoImage {
     /// Whether its grey image is there.
     pub fn has_image(&self) -> bool {
         self.image.is_some()
@@ -55,7 +55,7 @@ impl Seen {
 ///
 /// # Errors
 /// With the entry that is not what it should be, or where no entry has a file.
-pub(super) fn read(folder: &Path) -> Result<Vec<Seen>> {
+pub(super) fn read(folder: &Path) -> Result<Vec<StereoImage>> {
     let path = folder.join(LIST);
     let json: Value = crate::json::read(&path)?;
     let Some(list) = json.as_array() else {
@@ -74,7 +74,7 @@ pub(super) fn read(folder: &Path) -> Result<Vec<Seen>> {
         let fault = |message: String| Error::format(&path, format!("[{i}]"), message);
         let size = size.ok_or_else(|| fault(format!("{} is no image that can be read", file.display())))?;
         let (time_secs, world_from_camera, optics) = camera(entry, size).map_err(fault)?;
-        out.push(Seen { time_secs, world_from_camera, optics, depth, image });
+        out.push(StereoImage { time_secs, world_from_camera, optics, depth, image });
     }
     if out.is_empty() {
         let message = format!("none of the images of its {} entries is in depth/ or rectified_images/", list.len());
@@ -100,11 +100,11 @@ fn camera(entry: &Value, size: [usize; 2]) -> std::result::Result<(f64, Pose, Op
 }
 
 /// The depth stream, and in words what its values were found to measure. `None` where no image has depth.
-pub(super) fn stream(seen: &[Seen], points: &[Point]) -> Option<(Depth, String)> {
-    let item = |s: &Seen| {
+pub(super) fn stream(seen: &[StereoImage], points: &[Point]) -> Option<(Depth, String)> {
+    let item = |s: &StereoImage| {
         let pose = RawPose {
             position: s.world_from_camera.translation.vector.into(),
-            turn: Turn::Quaternion(s.world_from_camera.rotation.coords.into()),
+            turn: RawRotation::Quaternion(s.world_from_camera.rotation.coords.into()),
         };
         let blob = Blob::File(s.depth.clone()?);
         Some(DepthAt { at: At::time(s.time_secs), blob, confidence: None, optics: Some(s.optics), pose: Some(pose) })
@@ -132,8 +132,8 @@ pub(super) fn stream(seen: &[Seen], points: &[Point]) -> Option<(Depth, String)>
 }
 
 /// How far depth is off from the points, as a share, taken along the axis and along the ray; where the two differ.
-fn deviations(depth: &Depth, seen: &[Seen], points: &[Point]) -> (Vec<f64>, Vec<f64>) {
-    let with: Vec<(&Seen, &PathBuf)> = seen.iter().filter_map(|s| Some((s, s.depth.as_ref()?))).collect();
+fn deviations(depth: &Depth, seen: &[StereoImage], points: &[Point]) -> (Vec<f64>, Vec<f64>) {
+    let with: Vec<(&StereoImage, &PathBuf)> = seen.iter().filter_map(|s| Some((s, s.depth.as_ref()?))).collect();
     let step = with.len().div_ceil(LOOKED_AT).max(1);
     let (mut off_z, mut off_ray) = (Vec::new(), Vec::new());
     for (s, file) in with.into_iter().step_by(step) {
@@ -159,9 +159,9 @@ fn deviations(depth: &Depth, seen: &[Seen], points: &[Point]) -> (Vec<f64>, Vec<
 }
 
 /// The grey images, each with its camera.
-pub(super) fn images(seen: &[Seen]) -> Vec<ImageAt> {
-    let image = |s: &Seen| {
-        let picture = Picture::Still(Blob::File(s.image.clone()?));
+pub(super) fn images(seen: &[StereoImage]) -> Vec<ImageAt> {
+    let image = |s: &StereoImage| {
+        let picture = ImageSource::Still(Blob::File(s.image.clone()?));
         Some(ImageAt { at: At::time(s.time_secs), picture, optics: Some(s.optics) })
     };
     seen.iter().filter_map(image).collect()

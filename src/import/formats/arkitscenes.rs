@@ -6,14 +6,15 @@
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::import::Options;
+use crate::import::ImportOptions;
 use crate::import::blob::{Blob, files, inside};
 use crate::import::capture::{
-    At, Capture, Depth, DepthAt, DepthCoding, Direction, ImageAt, Picture, PoseAt, Poses, RawPose, Turn, World,
+    At, Capture, Depth, DepthAt, DepthCoding, Direction, ImageAt, ImageSource, PoseAt, Poses, RawPose, RawRotation,
+    SourceWorld,
 };
 use crate::import::names::{last, stem};
 use crate::import::optics::Optics;
-use crate::import::text::{Lines, cells};
+use crate::import::text::{Lines, Unread, cells};
 use crate::math::Vector;
 
 /// Confidence is 0, 1 or 2; 0 is noise at edges and on dark surfaces.
@@ -32,9 +33,9 @@ pub(super) fn detect(path: &Path) -> bool {
     root.join("lowres_wide.traj").is_file() && ["lowres_wide", "lowres_depth"].iter().any(|f| root.join(f).is_dir())
 }
 
-pub(super) fn read(source: &Path, _options: &Options) -> Result<Capture> {
+pub(super) fn read(source: &Path, _options: &ImportOptions) -> Result<Capture> {
     let path = &root(source);
-    let poses = trajectory(&path.join("lowres_wide.traj"))?;
+    let (poses, dropped) = trajectory(&path.join("lowres_wide.traj"))?;
     let intrinsics = timed(&path.join("lowres_wide_intrinsics"), "pincam");
     let mut images = Vec::new();
     let mut optics = None;
@@ -42,7 +43,7 @@ pub(super) fn read(source: &Path, _options: &Options) -> Result<Capture> {
         let own = nearest(&intrinsics, time).map(pincam).transpose()?;
         optics = optics.or(own);
         let at = At::time(time).with_name(&last(&file));
-        images.push(ImageAt { at, picture: Picture::Still(Blob::File(file)), optics: own });
+        images.push(ImageAt { at, picture: ImageSource::Still(Blob::File(file)), optics: own });
     }
     // Depth has the size of these images, so that their camera is known without them.
     if let (None, Some((_, file))) = (optics, intrinsics.first()) {
@@ -66,7 +67,8 @@ pub(super) fn read(source: &Path, _options: &Options) -> Result<Capture> {
         title: "ARKitScenes scan".to_owned(),
         licence: Some("CC BY-NC-SA 4.0 (Apple)".to_owned()),
         notes,
-        world: World { up: Some(Vector::z()), ..World::default() },
+        dropped: dropped.into_iter().collect(),
+        world: SourceWorld { up: Some(Vector::z()), ..SourceWorld::default() },
         optics,
         poses: Some(Poses { direction: Direction::CameraFromWorld, items: poses, ..Poses::default() }),
         images,
@@ -116,18 +118,22 @@ fn pincam(path: &Path) -> Result<Optics> {
     optics.fault().map_or(Ok(optics), |fault| Err(lines.fault(fault)))
 }
 
-fn trajectory(path: &Path) -> Result<Vec<PoseAt>> {
+/// The poses, and what of them cannot be read.
+fn trajectory(path: &Path) -> Result<(Vec<PoseAt>, Option<String>)> {
     let mut lines = Lines::open(path)?;
     let mut out = Vec::new();
+    let mut unread = Unread::default();
     while let Some(line) = lines.content()? {
-        let [t, a, b, c, x, y, z] = numbers::<7>(&lines, &line, "t, an axis times an angle, x y z")?;
-        let pose = RawPose { position: [x, y, z], turn: Turn::AxisAngle([a, b, c]) };
+        let row = numbers::<7>(&lines, &line, "t, an axis times an angle, x y z");
+        let Some([t, a, b, c, x, y, z]) = unread.keep(row) else { continue };
+        let pose = RawPose { position: [x, y, z], turn: RawRotation::AxisAngle([a, b, c]) };
         out.push(PoseAt { at: At::time(t), pose, optics: None });
     }
+    let dropped = unread.told("poses", out.len())?;
     if out.is_empty() {
         return Err(Error::format(path, "lines", "there is none; was the scan downloaded as a whole?"));
     }
-    Ok(out)
+    Ok((out, dropped))
 }
 
 /// The numbers of a line, as many as expected.

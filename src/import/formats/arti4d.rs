@@ -10,16 +10,17 @@ use nalgebra::UnitQuaternion;
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
-use crate::import::Options;
+use crate::import::ImportOptions;
 use crate::import::axes::quaternion;
 use crate::import::blob::{Blob, files};
 use crate::import::capture::{
-    At, Capture, ClipAt, Depth, DepthAt, DepthCoding, ImageAt, Picture, PoseAt, Poses, QuaternionOrder, RawPose, Turn,
-    World,
+    At, Capture, ClipAt, Depth, DepthAt, DepthCoding, ImageAt, ImageSource, PoseAt, Poses, QuaternionOrder, RawPose,
+    RawRotation, SourceWorld,
 };
 use crate::import::names::{last, stem};
-use crate::import::optics::{Lens, Optics};
-use crate::import::text::{Lines, Table};
+use crate::import::optics::{LensModel, Optics};
+use crate::import::text::Unread;
+use crate::import::text::{Lines, TextTable};
 use crate::math::{Pose, Vector};
 
 /// Where the calibration lies, seen from the sequence or a folder above it.
@@ -31,7 +32,7 @@ const ABOVE: usize = 4;
 const UPRIGHT: f64 = 0.5;
 
 #[derive(Deserialize)]
-struct Calibration {
+struct Arti4dCalibration {
     #[serde(rename = "base_T_depth")]
     base_from_depth: Transform,
     #[serde(rename = "depth_T_rgb")]
@@ -72,9 +73,9 @@ pub(super) fn detect(path: &Path) -> bool {
     path.join("rgb/camera_info.txt").is_file() && path.join("odom").is_dir()
 }
 
-pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, _options: &ImportOptions) -> Result<Capture> {
     let (base_from_depth, depth_from_rgb) = calibration(path)?;
-    let poses = trajectory(&odometry(path)?)?;
+    let (poses, dropped) = trajectory(&odometry(path)?)?;
     let color = camera_info(&path.join("rgb/camera_info.txt"))?;
     let mut notes = Vec::new();
     let base_from_rgb = base_from_depth * depth_from_rgb;
@@ -88,7 +89,7 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         Pose::from_parts(Vector::zeros().into(), if half_turn { about_axis() } else { UnitQuaternion::identity() });
     let images: Vec<ImageAt> = timed(&path.join("rgb"), "jpg")
         .into_iter()
-        .map(|(at, file)| ImageAt { at, picture: Picture::Still(Blob::File(file)), optics: None })
+        .map(|(at, file)| ImageAt { at, picture: ImageSource::Still(Blob::File(file)), optics: None })
         .collect();
     let depth: Vec<DepthAt> = timed(&path.join("depth"), "png")
         .into_iter()
@@ -105,7 +106,8 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         title: "Arti4D sequence".to_owned(),
         clips: cues(path, &mut notes)?,
         notes,
-        world: World { up, ..World::default() },
+        dropped: dropped.into_iter().collect(),
+        world: SourceWorld { up, ..SourceWorld::default() },
         optics: Some(color),
         poses: Some(Poses { body_from_camera: Some(base_from_rgb * turn), items: poses, ..Poses::default() }),
         images,
@@ -126,7 +128,9 @@ fn about_axis() -> UnitQuaternion<f64> {
 /// Whether the images were turned, and up where +Z is it.
 fn held(poses: &[PoseAt], base_from_rgb: &Pose) -> (bool, Option<Vector>) {
     let ups = poses.iter().filter_map(|p| match p.pose.turn {
-        Turn::Quaternion(q) => Some(quaternion(q, QuaternionOrder::Xyzw)? * base_from_rgb.rotation * -Vector::y()),
+        RawRotation::Quaternion(q) => {
+            Some(quaternion(q, QuaternionOrder::Xyzw)? * base_from_rgb.rotation * -Vector::y())
+        }
         _ => None,
     });
     let (sum, count) = ups.fold((Vector::zeros(), 0usize), |(sum, n), up| (sum + up, n + 1));
@@ -155,7 +159,7 @@ fn calibration(path: &Path) -> Result<(Pose, Pose)> {
                        the tracker to the camera: unpack arti4d-meta.zip, or put it into the sequence's folder";
         return Err(Error::format(path, "calibration", message));
     };
-    let content: Calibration = crate::json::read(&file)?;
+    let content: Arti4dCalibration = crate::json::read(&file)?;
     match (content.base_from_depth.pose(), content.depth_from_rgb.pose()) {
         (Some(a), Some(b)) => Ok((a, b)),
         (None, _) => Err(Error::format(&file, "base_T_depth", "the rotation is no unit quaternion x y z w")),
@@ -178,19 +182,23 @@ fn odometry(path: &Path) -> Result<PathBuf> {
     }
 }
 
-fn trajectory(path: &Path) -> Result<Vec<PoseAt>> {
-    let mut table = Table::open(path)?;
+/// The poses, and what of them cannot be read.
+fn trajectory(path: &Path) -> Result<(Vec<PoseAt>, Option<String>)> {
+    let mut table = TextTable::open(path)?;
     table.need(&["timestamp", "x", "y", "z", "qx", "qy", "qz", "qw"])?;
     let mut out = Vec::new();
+    let mut unread = Unread::default();
     while let Some(row) = table.row()? {
-        let position = row.numbers(["x", "y", "z"])?;
-        let turn = Turn::Quaternion(row.numbers(["qx", "qy", "qz", "qw"])?);
-        out.push(PoseAt { at: At::time(row.number("timestamp")?), pose: RawPose { position, turn }, optics: None });
+        let values = unread.keep(row.numbers(["timestamp", "x", "y", "z", "qx", "qy", "qz", "qw"]));
+        let Some([t, x, y, z, a, b, c, d]) = values else { continue };
+        let pose = RawPose { position: [x, y, z], turn: RawRotation::Quaternion([a, b, c, d]) };
+        out.push(PoseAt { at: At::time(t), pose, optics: None });
     }
+    let dropped = unread.told("poses", out.len())?;
     if out.is_empty() {
         return Err(Error::format(path, "rows", "there is none; was the sequence unpacked as a whole?"));
     }
-    Ok(out)
+    Ok((out, dropped))
 }
 
 /// Images by the time at the end of their names.
@@ -239,9 +247,9 @@ fn camera_info(path: &Path) -> Result<Optics> {
     let lens = match d.as_deref() {
         Some([k1, k2, p1, p2, k3, rest @ ..]) if d.iter().flatten().any(|c| *c != 0.0) => {
             let more = |i: usize| rest.get(i).copied().unwrap_or(0.0);
-            Lens::OpenCv { k: [*k1, *k2, *k3, more(0), more(1), more(2)], p: [*p1, *p2] }
+            LensModel::OpenCv { k: [*k1, *k2, *k3, more(0), more(1), more(2)], p: [*p1, *p2] }
         }
-        _ => Lens::Pinhole,
+        _ => LensModel::Pinhole,
     };
     let optics = Optics { width, height, fx: *fx, fy: *fy, cx: *cx, cy: *cy, lens };
     optics.fault().map_or(Ok(optics), |fault| Err(Error::format(path, "K, D", fault)))
@@ -253,7 +261,7 @@ fn cues(path: &Path, notes: &mut Vec<String>) -> Result<Vec<ClipAt>> {
     if !file.is_file() {
         return Ok(Vec::new());
     }
-    let mut table = Table::open(&file)?;
+    let mut table = TextTable::open(&file)?;
     table.need(&["cue_start", "cue_end"])?;
     let has_opinion = table.has("verification");
     let (mut out, mut left_out) = (Vec::new(), 0);

@@ -11,11 +11,11 @@ use std::path::{Path, PathBuf};
 use nalgebra::Matrix4;
 
 use crate::error::{Error, Result};
-use crate::import::Options;
+use crate::import::ImportOptions;
 use crate::import::blob::{Blob, inside};
 use crate::import::capture::Capture;
 use crate::import::names::{ending, head};
-use crate::import::text::{Lines, Table};
+use crate::import::text::{Lines, TextTable};
 use crate::math::Point;
 use crate::recording::reconstruction;
 
@@ -27,7 +27,7 @@ const MAX_DIST_STD: f64 = 0.01;
 /// Names of a point's columns.
 const COLUMNS: [[&str; 3]; 2] = [["px_world", "py_world", "pz_world"], ["x", "y", "z"]];
 /// Nodes of a glTF below each other.
-const MAX_NODES: usize = 100_000;
+pub(super) const MAX_NODES: usize = 100_000;
 
 type Triangle = [Point; 3];
 
@@ -47,7 +47,7 @@ pub(super) fn detect(path: &Path) -> bool {
     }
 }
 
-pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, _options: &ImportOptions) -> Result<Capture> {
     Ok(Capture {
         kind: "cloud".to_owned(),
         source: path.to_owned(),
@@ -76,7 +76,7 @@ pub(super) fn points(path: &Path) -> Result<Vec<Point>> {
 }
 
 fn table(path: &Path) -> Result<Vec<Point>> {
-    let mut table = Table::open(path)?;
+    let mut table = TextTable::open(path)?;
     let [aria, plain] = COLUMNS;
     let columns = if table.has(aria[0]) { aria } else { plain };
     table.need(&columns)?;
@@ -118,7 +118,7 @@ fn obj(path: &Path) -> Result<Vec<Point>> {
 }
 
 /// Corners of faces must name what is there, which tobj takes for granted.
-fn check_corners(path: &Path) -> Result<()> {
+pub(super) fn check_corners(path: &Path) -> Result<()> {
     let mut lines = Lines::open(path)?;
     // Vertices, texture coordinates, normals.
     let mut there = [0i64; 3];
@@ -193,10 +193,26 @@ fn sampled(triangles: &[Triangle]) -> Vec<Point> {
     out
 }
 
-fn gltf(path: &Path) -> Result<Vec<Point>> {
+/// A glTF as it is in its file. Its reader takes for granted that the accessors which a mesh names are there; here they are looked
+/// for first.
+///
+/// # Errors
+/// What is no glTF, or names what it does not have.
+pub(crate) fn document(path: &Path, bytes: &[u8]) -> Result<gltf::Gltf> {
     let broken = |e: gltf::Error| Error::format(path, "glTF", format!("cannot be read ({e}); export it again"));
+    let unchecked = gltf::Gltf::from_slice_without_validation(bytes).map_err(broken)?;
+    let json = unchecked.document.as_json();
+    let named = json.meshes.iter().flat_map(|m| &m.primitives).flat_map(|p| p.attributes.values());
+    if let Some(wrong) = named.map(|index| index.value()).find(|index| *index >= json.accessors.len()) {
+        let message = format!("a mesh names accessor {wrong}, and there are {}; export it again", json.accessors.len());
+        return Err(Error::format(path, "meshes", message));
+    }
+    gltf::Gltf::from_slice(bytes).map_err(broken)
+}
+
+fn gltf(path: &Path) -> Result<Vec<Point>> {
     let bytes = Blob::File(path.to_owned()).read()?;
-    let file = gltf::Gltf::from_slice(&bytes).map_err(broken)?;
+    let file = document(path, &bytes)?;
     let buffers = buffers(path, &file)?;
     let mut out = Vec::new();
     let mut triangles = Vec::new();
@@ -222,7 +238,11 @@ fn gltf(path: &Path) -> Result<Vec<Point>> {
 }
 
 /// Vertices in the world, and corners of triangles; nothing of what reaches beyond its buffer.
-fn surface(primitive: &gltf::Primitive<'_>, buffers: &[Vec<u8>], world: &Matrix4<f64>) -> (Vec<Point>, Vec<usize>) {
+pub(super) fn surface(
+    primitive: &gltf::Primitive<'_>,
+    buffers: &[Vec<u8>],
+    world: &Matrix4<f64>,
+) -> (Vec<Point>, Vec<usize>) {
     use gltf::accessor::{DataType, Dimensions};
     let none = (Vec::new(), Vec::new());
     let Some(positions) = primitive.get(&gltf::Semantic::Positions) else { return none };
@@ -251,7 +271,7 @@ fn surface(primitive: &gltf::Primitive<'_>, buffers: &[Vec<u8>], world: &Matrix4
 }
 
 /// Bytes of each element of an accessor; `None` where they are not all there.
-fn elements<'a>(accessor: &gltf::Accessor<'_>, buffers: &'a [Vec<u8>]) -> Option<Vec<&'a [u8]>> {
+pub(super) fn elements<'a>(accessor: &gltf::Accessor<'_>, buffers: &'a [Vec<u8>]) -> Option<Vec<&'a [u8]>> {
     let view = accessor.view()?;
     let size = accessor.size();
     let step = view.stride().unwrap_or(size);
@@ -265,7 +285,7 @@ fn elements<'a>(accessor: &gltf::Accessor<'_>, buffers: &'a [Vec<u8>]) -> Option
 }
 
 /// Bytes of the buffers: within the file, as text, or of files beside it.
-fn buffers(path: &Path, file: &gltf::Gltf) -> Result<Vec<Vec<u8>>> {
+pub(super) fn buffers(path: &Path, file: &gltf::Gltf) -> Result<Vec<Vec<u8>>> {
     use base64::Engine as _;
     let folder: PathBuf =
         path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new(".")).to_owned();

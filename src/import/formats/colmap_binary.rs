@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use super::colmap::{Cameras, MODELS, Posed, Thinned, optics, pose};
+use super::colmap_model::{Cameras, MODELS, RegisteredImage, Thinned, optics, pose};
 use crate::error::{Error, Result};
 use crate::math::Point;
 
@@ -105,7 +105,7 @@ pub(super) fn cameras(path: &Path) -> Result<Cameras> {
 }
 
 /// `images.bin`; the observations are passed over.
-pub(super) fn images(path: &Path) -> Result<Vec<Posed>> {
+pub(super) fn images(path: &Path) -> Result<Vec<RegisteredImage>> {
     let mut reader = Reader::open(path)?;
     let count = reader.u64()?;
     let mut out = Vec::new();
@@ -120,7 +120,7 @@ pub(super) fn images(path: &Path) -> Result<Vec<Posed>> {
         if values.iter().any(|v| !v.is_finite()) {
             return Err(reader.fault("the pose is not finite"));
         }
-        out.push(Posed { pose: pose(values), camera, name });
+        out.push(RegisteredImage { pose: pose(values), camera, name });
     }
     Ok(out)
 }

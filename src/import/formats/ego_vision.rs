@@ -9,10 +9,13 @@ use std::path::Path;
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
-use crate::import::Options;
-use crate::import::capture::{At, Capture, HandAt, Hands, JointFrame, Missing, PoseAt, Poses, RawPose, World};
-use crate::import::joints::JointOrder;
+use crate::import::ImportOptions;
+use crate::import::capture::{
+    At, Capture, HandAt, HandStream, JointFrame, Missing, PoseAt, Poses, RawPose, SourceWorld,
+};
+use crate::import::joint_orders::JointOrder;
 use crate::import::optics::Optics;
+use crate::import::text::Unread;
 use crate::recording::Side;
 
 /// Frames a second where the file does not say.
@@ -35,27 +38,27 @@ type Maybe = Option<f64>;
 struct Document {
     fps: Option<f64>,
     camera_trajectory: Vec<Vec<Vec<Maybe>>>,
-    intrinsics: Option<Intrinsics>,
-    hands_world: Option<Both>,
+    intrinsics: Option<CameraMatrices>,
+    hands_world: Option<HandTracks>,
 }
 
 /// One camera, or one a frame.
 #[derive(Deserialize)]
 #[serde(untagged)]
-enum Intrinsics {
+enum CameraMatrices {
     Each(Vec<[[Maybe; 3]; 3]>),
     One([[Maybe; 3]; 3]),
     Named { fx: f64, fy: f64, cx: f64, cy: f64 },
 }
 
 #[derive(Deserialize)]
-struct Both {
-    left: Option<Track>,
-    right: Option<Track>,
+struct HandTracks {
+    left: Option<HandTrack>,
+    right: Option<HandTrack>,
 }
 
 #[derive(Deserialize)]
-struct Track {
+struct HandTrack {
     joints_world: Vec<Vec<[Maybe; 3]>>,
     confidence: Option<Vec<Maybe>>,
     infilled: Option<Vec<Flag>>,
@@ -77,28 +80,14 @@ impl Flag {
     }
 }
 
-pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, options: &ImportOptions) -> Result<Capture> {
     let document: Document = crate::json::parse(&without_nan(&crate::json::read_text(path)?), path)?;
     let fps = options.source_fps.or(document.fps).filter(|f| f.is_finite() && *f > 0.0).unwrap_or(USUAL_FPS);
     let at = |index: usize| At::time(index as f64 / fps).with_index(index);
     let mut notes = vec![format!(
         "times are counted at {fps} frames a second; distances are the networks' own, --scale sets them right"
     )];
-    let mut poses = Vec::new();
-    for (index, rows) in document.camera_trajectory.iter().enumerate() {
-        if rows.len() < 3 || rows.iter().any(|row| row.len() != 4) {
-            let message = "must be a matrix of 3 or 4 rows of 4 numbers";
-            return Err(Error::format(path, format!("camera_trajectory[{index}]"), message));
-        }
-        // A camera that was not found is no pose.
-        let numbers: Option<Vec<f64>> = rows.iter().flatten().copied().collect();
-        if let Some(pose) = numbers.and_then(|n| RawPose::from_rows(&n)) {
-            poses.push(PoseAt { at: at(index), pose, optics: None });
-        }
-    }
-    if poses.is_empty() {
-        return Err(Error::format(path, "camera_trajectory", "holds no cameras"));
-    }
+    let (poses, dropped) = cameras(&document, path, &at)?;
     let optics = document.intrinsics.as_ref().and_then(optics);
     match &optics {
         Some(o) => {
@@ -108,7 +97,7 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
     }
     let mut items = Vec::new();
     let mut filled = 0;
-    let both = document.hands_world.unwrap_or(Both { left: None, right: None });
+    let both = document.hands_world.unwrap_or(HandTracks { left: None, right: None });
     for (side, track) in [(Side::Left, both.left), (Side::Right, both.right)] {
         let Some(track) = track else { continue };
         filled += hands(&track, side, &at, &mut items);
@@ -116,13 +105,14 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
     if filled > 0 {
         notes.push(format!("{filled} hands that were filled in are left out"));
     }
-    let hands = Hands { frame: JointFrame::World, order: JointOrder::Mano, unit_m: 1.0, items };
+    let hands = HandStream { frame: JointFrame::World, order: JointOrder::Mano, unit_m: 1.0, items };
     Ok(Capture {
         kind: "ego-vision".to_owned(),
         source: path.to_owned(),
         title: "result of ego-vision".to_owned(),
         notes,
-        world: World::default(),
+        dropped: dropped.into_iter().collect(),
+        world: SourceWorld::default(),
         optics,
         poses: Some(Poses { items: poses, ..Poses::default() }),
         hands: (!hands.items.is_empty()).then_some(hands),
@@ -135,8 +125,31 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
     })
 }
 
+/// The cameras that were found, and what could not be read of them.
+fn cameras(document: &Document, path: &Path, at: &dyn Fn(usize) -> At) -> Result<(Vec<PoseAt>, Option<String>)> {
+    let mut poses = Vec::new();
+    let mut unread = Unread::default();
+    for (index, rows) in document.camera_trajectory.iter().enumerate() {
+        if rows.len() < 3 || rows.iter().any(|row| row.len() != 4) {
+            let message = "must be a matrix of 3 or 4 rows of 4 numbers";
+            unread.keep::<()>(Err(Error::format(path, format!("camera_trajectory[{index}]"), message)));
+            continue;
+        }
+        // A camera that was not found is no pose.
+        let numbers: Option<Vec<f64>> = rows.iter().flatten().copied().collect();
+        if let Some(pose) = numbers.and_then(|n| RawPose::from_rows(&n)) {
+            poses.push(PoseAt { at: at(index), pose, optics: None });
+        }
+    }
+    let dropped = unread.told("cameras", poses.len())?;
+    if poses.is_empty() {
+        return Err(Error::format(path, "camera_trajectory", "holds no cameras"));
+    }
+    Ok((poses, dropped))
+}
+
 /// Hands that were seen; how many were not.
-fn hands(track: &Track, side: Side, at: &dyn Fn(usize) -> At, out: &mut Vec<HandAt>) -> usize {
+fn hands(track: &HandTrack, side: Side, at: &dyn Fn(usize) -> At, out: &mut Vec<HandAt>) -> usize {
     let mut filled = 0;
     for (index, joints) in track.joints_world.iter().enumerate() {
         let score = track.confidence.as_ref().map(|c| c.get(index).copied().flatten().unwrap_or(0.0));
@@ -153,12 +166,12 @@ fn hands(track: &Track, side: Side, at: &dyn Fn(usize) -> At, out: &mut Vec<Hand
 }
 
 /// The camera; of cameras frame by frame the middle one, as they differ by the network's noise.
-fn optics(intrinsics: &Intrinsics) -> Option<Optics> {
+fn optics(intrinsics: &CameraMatrices) -> Option<Optics> {
     let of = |[[fx, _, cx], [_, fy, cy], _]: [[Maybe; 3]; 3]| Some([fx?, fy?, cx?, cy?]);
     let [fx, fy, cx, cy] = match intrinsics {
-        Intrinsics::Named { fx, fy, cx, cy } => [*fx, *fy, *cx, *cy],
-        Intrinsics::One(k) => of(*k)?,
-        Intrinsics::Each(all) => {
+        CameraMatrices::Named { fx, fy, cx, cy } => [*fx, *fy, *cx, *cy],
+        CameraMatrices::One(k) => of(*k)?,
+        CameraMatrices::Each(all) => {
             let mut found: Vec<[f64; 4]> = all.iter().filter_map(|k| of(*k)).collect();
             found.sort_by(|a, b| a[0].total_cmp(&b[0]));
             *found.get(found.len() / 2)?

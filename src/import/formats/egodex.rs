@@ -5,13 +5,14 @@
 use std::path::Path;
 
 use crate::error::Result;
-use crate::import::Options;
+use crate::import::ImportOptions;
 use crate::import::blob::beside;
 use crate::import::capture::{
-    At, Capture, ClipAt, HandAt, Hands, ImageAt, JointFrame, Missing, Picture, PoseAt, Poses, RawPose, World,
+    At, Capture, ClipAt, HandAt, HandStream, ImageAt, ImageSource, JointFrame, Missing, PoseAt, Poses, RawPose,
+    SourceWorld,
 };
 use crate::import::h5::{Hdf5, is_hdf5};
-use crate::import::joints::{ARKIT_NAMES, JointOrder};
+use crate::import::joint_orders::{ARKIT_NAMES, JointOrder};
 use crate::import::optics::Optics;
 use crate::math::Vector;
 use crate::recording::Side;
@@ -23,7 +24,7 @@ pub(super) fn detect(path: &Path) -> bool {
     is_hdf5(path) && Hdf5::open(path).is_ok_and(|h5| h5.has("transforms/camera") && h5.has("transforms/leftHand"))
 }
 
-pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, _options: &ImportOptions) -> Result<Capture> {
     let h5 = Hdf5::open(path)?;
     let cameras = h5.numbers("transforms/camera", &[None, Some(4), Some(4)])?;
     let count = cameras.len() / 16;
@@ -39,7 +40,7 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
     let video = beside(path, &format!("{stem}.mp4"))?;
     let images = video.iter().flat_map(|file| {
         (0..count).map(move |index| {
-            let picture = Picture::Video { file: file.clone(), index, upright: false };
+            let picture = ImageSource::Video { file: file.clone(), index, upright: false };
             ImageAt { at: at(index), picture, optics: None }
         })
     });
@@ -59,15 +60,16 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         title: "EgoDex recording".to_owned(),
         licence: Some("CC BY-NC-ND".to_owned()),
         notes: vec![format!("times are counted at {FPS} frames a second; joints of confidence 0 are left out")],
-        world: World { up: Some(Vector::y()), ..World::default() },
+        world: SourceWorld { up: Some(Vector::y()), ..SourceWorld::default() },
         optics: Some(optics(&h5)?),
         poses: Some(Poses { items: poses.collect(), ..Poses::default() }),
         images: images.collect(),
-        hands: Some(Hands { frame: JointFrame::World, order: JointOrder::Mano, unit_m: 1.0, items: hands }),
+        hands: Some(HandStream { frame: JointFrame::World, order: JointOrder::Mano, unit_m: 1.0, items: hands }),
         clips: clip(&h5, &stem, at(0), at(count - 1)).into_iter().collect(),
         missing: vec![Missing {
             what: "depth".to_owned(),
-            why: "the headset's depth is not in the data set".to_owned(),
+            why: "the headset's depth is not in the data set: joints come from the hands, fronts and boxes are assumed"
+                .to_owned(),
             command: "run a metric depth network (MoGe-2) on the video's pictures and import its folder too".to_owned(),
         }],
         ..Capture::default()

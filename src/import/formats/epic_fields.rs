@@ -8,23 +8,24 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use super::colmap::{self, Thinned};
+use super::colmap_model::{self, Thinned};
 use crate::error::{Error, Result};
-use crate::import::Options;
-use crate::import::capture::{At, Capture, Direction, Missing, PoseAt, Poses, QuaternionOrder, World};
+use crate::import::ImportOptions;
+use crate::import::capture::{At, Capture, Direction, Missing, PoseAt, Poses, QuaternionOrder, SourceWorld};
 use crate::import::names::{ending, head, numbered, stem};
+use crate::import::text::Unread;
 use crate::math::Point;
 
 #[derive(Deserialize)]
-struct File {
-    camera: Camera,
+struct EpicFieldsFile {
+    camera: EpicCamera,
     images: BTreeMap<String, Vec<f64>>,
     #[serde(default)]
     points: Vec<Vec<f64>>,
 }
 
 #[derive(Deserialize)]
-struct Camera {
+struct EpicCamera {
     model: String,
     width: usize,
     height: usize,
@@ -39,24 +40,27 @@ pub(super) fn detect(path: &Path) -> bool {
     start.contains("\"camera\"") && start.contains("\"params\"") && start.contains("\"model\"")
 }
 
-pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
-    let content: File = crate::json::read(path)?;
+pub(super) fn read(path: &Path, _options: &ImportOptions) -> Result<Capture> {
+    let content: EpicFieldsFile = crate::json::read(path)?;
     let c = &content.camera;
     let optics =
-        colmap::optics(&c.model, c.width, c.height, &c.params).map_err(|e| Error::format(path, "camera", e))?;
+        colmap_model::optics(&c.model, c.width, c.height, &c.params).map_err(|e| Error::format(path, "camera", e))?;
     let mut items = Vec::with_capacity(content.images.len());
+    let mut unread = Unread::default();
     for (name, numbers) in &content.images {
         let whole: Option<[f64; 7]> = numbers.as_slice().try_into().ok();
-        let Some(whole) = whole.filter(|n| n.iter().all(|x| x.is_finite())) else {
+        let whole = whole.filter(|n| n.iter().all(|x| x.is_finite())).ok_or_else(|| {
             let message = format!("{} numbers, expected qw qx qy qz tx ty tz", numbers.len());
-            return Err(Error::format(path, format!("images.{name}"), message));
-        };
+            Error::format(path, format!("images.{name}"), message)
+        });
+        let Some(whole) = unread.keep(whole) else { continue };
         let mut at = At::name(name);
         if let Some((_, number)) = numbered(&stem(Path::new(name))) {
             at = at.with_index(number as usize);
         }
-        items.push(PoseAt { at, pose: colmap::pose(whole), optics: None });
+        items.push(PoseAt { at, pose: colmap_model::pose(whole), optics: None });
     }
+    let dropped = unread.told("poses", items.len())?;
     if items.is_empty() {
         return Err(Error::format(path, "images", "none is registered; nothing to import"));
     }
@@ -71,7 +75,8 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         source: path.to_owned(),
         title: "EPIC-Fields poses".to_owned(),
         licence: Some("CC BY-NC 4.0 (EPIC-KITCHENS)".to_owned()),
-        world: World { up: None, unit_m: None, left_handed: false },
+        dropped: dropped.into_iter().collect(),
+        world: SourceWorld { up: None, unit_m: None, left_handed: false },
         optics: Some(optics),
         poses: Some(Poses {
             direction: Direction::CameraFromWorld,

@@ -6,9 +6,9 @@
 use std::path::Path;
 
 use crate::error::{Error, Result};
-use crate::import::Options;
+use crate::import::ImportOptions;
 use crate::import::blob::{Blob, files};
-use crate::import::capture::{At, Capture, ImageAt, Picture};
+use crate::import::capture::{At, Capture, ImageAt, ImageSource};
 use crate::import::text::{Lines, cells};
 use crate::import::video;
 
@@ -18,7 +18,7 @@ pub(super) fn detect(path: &Path) -> bool {
     if path.is_dir() { !files(path, &IMAGES).is_empty() } else { video::is_video(path) }
 }
 
-pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, options: &ImportOptions) -> Result<Capture> {
     let images = if path.is_dir() { folder(path)? } else { pictures(path, options)? };
     let title = if path.is_dir() { "a folder of images" } else { "a video file" };
     Ok(Capture {
@@ -41,7 +41,7 @@ fn folder(path: &Path) -> Result<Vec<ImageAt>> {
         let name = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let time_secs = times.as_ref().and_then(|t| t.get(index).copied());
         let at = At { time_secs, ..At::name(&name).with_index(index) };
-        ImageAt { at, picture: Picture::Still(Blob::File(file)), optics: None }
+        ImageAt { at, picture: ImageSource::Still(Blob::File(file)), optics: None }
     };
     Ok(files.into_iter().enumerate().map(image).collect())
 }
@@ -63,11 +63,11 @@ fn seconds(path: &Path, expected: usize) -> Result<Vec<f64>> {
     Ok(out)
 }
 
-fn pictures(path: &Path, options: &Options) -> Result<Vec<ImageAt>> {
+fn pictures(path: &Path, options: &ImportOptions) -> Result<Vec<ImageAt>> {
     let times = video::times(options.ffmpeg.as_deref(), path)?;
     let image = |(index, time): (usize, f64)| ImageAt {
         at: At::time(time).with_index(index),
-        picture: Picture::Video { file: path.to_owned(), index, upright: true },
+        picture: ImageSource::Video { file: path.to_owned(), index, upright: true },
         optics: None,
     };
     Ok(times.into_iter().enumerate().map(image).collect())

@@ -8,20 +8,20 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
-use crate::import::Options;
+use crate::import::ImportOptions;
 use crate::import::blob::files;
 use crate::import::capture::{At, Capture, Layer, MaskAt, Masks};
 use crate::import::names::{ending, head, stem};
 use crate::recording::HAND_CLASS;
 
 #[derive(Deserialize)]
-struct File {
+struct GroundedSamFile {
     image_path: Option<String>,
-    annotations: Vec<Annotation>,
+    annotations: Vec<MaskAnnotation>,
 }
 
 #[derive(Deserialize)]
-struct Annotation {
+struct MaskAnnotation {
     class_name: String,
     segmentation: Segmentation,
     score: Option<Score>,
@@ -50,7 +50,7 @@ enum Score {
     List(Vec<f64>),
 }
 
-impl Annotation {
+impl MaskAnnotation {
     fn score(&self) -> f64 {
         match &self.score {
             Some(Score::One(score)) => *score,
@@ -78,7 +78,7 @@ pub(super) fn detect(path: &Path) -> bool {
     files(path, &["json"]).first().is_some_and(|f| is_one(f))
 }
 
-pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, _options: &ImportOptions) -> Result<Capture> {
     let found: Vec<PathBuf> = if path.is_file() {
         vec![path.to_owned()]
     } else {
@@ -86,7 +86,7 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
     };
     let (mut contents, mut notes, mut first) = (Vec::new(), Vec::new(), None);
     for file in &found {
-        match crate::json::read::<File>(file) {
+        match crate::json::read::<GroundedSamFile>(file) {
             Ok(content) => contents.push((file, content)),
             // One bad file costs its image.
             Err(error) => {
@@ -118,8 +118,8 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
 }
 
 /// Numbers of the classes; of more than fit in a mask the first ones by name.
-fn classes<'a>(annotations: impl Iterator<Item = &'a Annotation>) -> BTreeMap<String, u8> {
-    let names: BTreeSet<String> = annotations.map(Annotation::class).filter(|n| !n.is_empty()).collect();
+fn classes<'a>(annotations: impl Iterator<Item = &'a MaskAnnotation>) -> BTreeMap<String, u8> {
+    let names: BTreeSet<String> = annotations.map(MaskAnnotation::class).filter(|n| !n.is_empty()).collect();
     let (hands, others): (Vec<String>, Vec<String>) = names.into_iter().partition(|n| is_hand(n));
     let mut out: BTreeMap<String, u8> = others.into_iter().zip(1..HAND_CLASS).collect();
     // A class has one name in a recording: the last of several is told.
@@ -132,7 +132,7 @@ fn is_hand(name: &str) -> bool {
 }
 
 /// The image: by its path in the file, else by the file's name.
-fn place(file: &Path, content: &File) -> At {
+fn place(file: &Path, content: &GroundedSamFile) -> At {
     match &content.image_path {
         Some(image) => At::name(image),
         None => {
@@ -143,8 +143,13 @@ fn place(file: &Path, content: &File) -> At {
 }
 
 /// The masks of an image, the surest on top, hands over all.
-fn layers(file: &Path, content: &File, classes: &BTreeMap<String, u8>, notes: &mut Vec<String>) -> Vec<Layer> {
-    let mut order: Vec<&Annotation> = content.annotations.iter().collect();
+fn layers(
+    file: &Path,
+    content: &GroundedSamFile,
+    classes: &BTreeMap<String, u8>,
+    notes: &mut Vec<String>,
+) -> Vec<Layer> {
+    let mut order: Vec<&MaskAnnotation> = content.annotations.iter().collect();
     order.sort_by(|a, b| a.score().total_cmp(&b.score()));
     order.sort_by_key(|a| is_hand(&a.class()));
     let mut out = Vec::new();
@@ -221,7 +226,7 @@ mod tests {
 
     #[test]
     fn classes_have_numbers_by_name_and_hands_their_own() {
-        let of = |name: &str| Annotation {
+        let of = |name: &str| MaskAnnotation {
             class_name: name.to_owned(),
             segmentation: Segmentation { size: [1, 1], counts: Counts::Numbers(vec![1]) },
             score: None,

@@ -18,11 +18,13 @@ use std::path::Path;
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
-use crate::import::Options;
-use crate::import::capture::{At, CameraAxes, Capture, HandAt, Hands, JointFrame, PoseAt, Poses, RawPose, Turn, World};
-use crate::import::joints::JointOrder;
+use crate::import::ImportOptions;
+use crate::import::capture::{
+    At, CameraAxes, Capture, HandAt, HandStream, JointFrame, PoseAt, Poses, RawPose, RawRotation, SourceWorld,
+};
+use crate::import::joint_orders::JointOrder;
 use crate::import::names::{ending, head};
-use crate::import::text::Lines;
+use crate::import::text::{Lines, Unread};
 use crate::math::{Vector, unit};
 use crate::recording::Side;
 
@@ -31,7 +33,7 @@ const FORMAT: &str = "paws-hands";
 const JOINTS: usize = 21;
 
 #[derive(Deserialize)]
-struct Header {
+struct HandFileHeader {
     format: String,
     space: Space,
     fps: Option<f64>,
@@ -49,7 +51,7 @@ enum Space {
 }
 
 #[derive(Deserialize)]
-struct Row {
+struct HandRow {
     image: Option<String>,
     frame: Option<usize>,
     time: Option<f64>,
@@ -64,51 +66,61 @@ pub(super) fn detect(path: &Path) -> bool {
     path.is_file() && ending(path) == "jsonl" && head(path, 4096).contains(FORMAT)
 }
 
-pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, _options: &ImportOptions) -> Result<Capture> {
     let mut lines = Lines::open(path)?;
     let Some(first) = lines.content()? else {
         return Err(lines.fault(format!("the file is empty; expected {{\"format\": \"{FORMAT}\", ...}}")));
     };
-    let header: Header = parse(&lines, &first)?;
+    let header: HandFileHeader = parse(&lines, &first)?;
     if header.format != FORMAT {
         return Err(lines.fault(format!("the format is not \"{FORMAT}\"")));
     }
     let (mut hands, mut poses) = (Vec::new(), Vec::new());
+    let mut unread = Unread::default();
     while let Some(line) = lines.content()? {
-        let row: Row = parse(&lines, &line)?;
-        let at = place(&row, &header).ok_or_else(|| lines.fault("has neither image, frame nor time"))?;
-        if let Some([x, y, z, a, b, c, d]) = row.camera {
-            let pose = RawPose { position: [x, y, z], turn: Turn::Quaternion([a, b, c, d]) };
-            poses.push(PoseAt { at: at.clone(), pose, optics: None });
-        }
-        match (row.joints, row.side) {
-            (Some(joints), Some(side)) if joints.len() == JOINTS => {
-                hands.push(HandAt { at, side, joints, contact: row.contact, score: row.score });
-            }
-            (Some(joints), Some(_)) => {
-                return Err(lines.fault(format!("{} joints, expected {JOINTS} in MANO's order", joints.len())));
-            }
-            (Some(_), None) => return Err(lines.fault("has joints and no side (left or right)")),
-            (None, _) if row.camera.is_none() => return Err(lines.fault("has neither joints nor a camera")),
-            (None, _) => {}
-        }
+        let Some((pose, hand)) = unread.keep(told(&lines, &line, &header)) else { continue };
+        poses.extend(pose);
+        hands.extend(hand);
     }
+    let dropped = unread.told("lines", hands.len() + poses.len())?;
     if hands.is_empty() && poses.is_empty() {
         return Err(Error::format(path, "lines", "no hand and no camera follows the first line"));
     }
     let frame = if header.space == Space::World { JointFrame::World } else { JointFrame::Camera(CameraAxes::Opencv) };
-    let items = Hands { frame, order: JointOrder::Mano, unit_m: 1.0, items: hands };
+    let items = HandStream { frame, order: JointOrder::Mano, unit_m: 1.0, items: hands };
     Ok(Capture {
         kind: "hands".to_owned(),
         source: path.to_owned(),
         title: header.title.unwrap_or_else(|| "hands as JSON lines".to_owned()),
         licence: header.licence,
-        world: World { up: header.up.and_then(|v| unit(&Vector::from(v))), ..World::default() },
+        dropped: dropped.into_iter().collect(),
+        world: SourceWorld { up: header.up.and_then(|v| unit(&Vector::from(v))), ..SourceWorld::default() },
         poses: (!poses.is_empty()).then(|| Poses { items: poses, ..Poses::default() }),
         hands: (!items.items.is_empty()).then_some(items),
         hands_focal_per_width: header.focal_per_width,
         ..Capture::default()
     })
+}
+
+/// What a line tells: a camera, a hand, or both.
+fn told(lines: &Lines, line: &str, header: &HandFileHeader) -> Result<(Option<PoseAt>, Option<HandAt>)> {
+    let row: HandRow = parse(lines, line)?;
+    let at = place(&row, header).ok_or_else(|| lines.fault("has neither image, frame nor time"))?;
+    let pose = row.camera.map(|[x, y, z, a, b, c, d]| {
+        let pose = RawPose { position: [x, y, z], turn: RawRotation::Quaternion([a, b, c, d]) };
+        PoseAt { at: at.clone(), pose, optics: None }
+    });
+    match (row.joints, row.side) {
+        (Some(joints), Some(side)) if joints.len() == JOINTS => {
+            Ok((pose, Some(HandAt { at, side, joints, contact: row.contact, score: row.score })))
+        }
+        (Some(joints), Some(_)) => {
+            Err(lines.fault(format!("{} joints, expected {JOINTS} in MANO's order", joints.len())))
+        }
+        (Some(_), None) => Err(lines.fault("has joints and no side (left or right)")),
+        (None, _) if pose.is_none() => Err(lines.fault("has neither joints nor a camera")),
+        (None, _) => Ok((pose, None)),
+    }
 }
 
 fn parse<T: serde::de::DeserializeOwned>(lines: &Lines, text: &str) -> Result<T> {
@@ -120,7 +132,7 @@ fn parse<T: serde::de::DeserializeOwned>(lines: &Lines, text: &str) -> Result<T>
     })
 }
 
-fn place(row: &Row, header: &Header) -> Option<At> {
+fn place(row: &HandRow, header: &HandFileHeader) -> Option<At> {
     let at = At {
         time_secs: row.time.or_else(|| {
             let fps = header.fps.filter(|f| f.is_finite() && *f > 0.0)?;
@@ -141,7 +153,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("hands.jsonl");
         std::fs::write(&path, text).unwrap();
-        read(&path, &Options::default())
+        read(&path, &ImportOptions::default())
     }
 
     fn joints(count: usize) -> String {

@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
-use crate::import::Options;
+use crate::import::ImportOptions;
 use crate::import::blob::{Blob, inside};
 use crate::import::capture::{At, Capture, ContactAt, Layer, MaskAt, Masks};
 use crate::import::names::{ending, head, numbered, stem};
@@ -18,15 +18,15 @@ const TOUCHING: [&str; 2] = ["object_contact", "obj_to_obj_contact"];
 const APART: [&str; 3] = ["no_contact", "self_contact", "other_person_contact"];
 
 #[derive(Deserialize)]
-struct File {
-    images: Vec<Image>,
+struct Hands23File {
+    images: Vec<Hands23Image>,
 }
 
 #[derive(Deserialize)]
-struct Image {
+struct Hands23Image {
     file_name: Name,
     #[serde(default)]
-    predictions: Vec<Prediction>,
+    predictions: Vec<Hands23Prediction>,
 }
 
 /// The image's name, or the number of a video's frame.
@@ -38,7 +38,7 @@ enum Name {
 }
 
 #[derive(Deserialize)]
-struct Prediction {
+struct Hands23Prediction {
     hand_id: Option<serde_json::Value>,
     contact_state: String,
     hand_side: String,
@@ -58,9 +58,9 @@ pub(super) fn detect(path: &Path) -> bool {
     start.contains("\"contact_state\"") || (start.contains("\"images\"") && start.contains("\"predictions\""))
 }
 
-pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, _options: &ImportOptions) -> Result<Capture> {
     let file = file(path);
-    let content: File = crate::json::read(&file)?;
+    let content: Hands23File = crate::json::read(&file)?;
     let root = file.parent().unwrap_or_else(|| Path::new("."));
     let mut capture = Capture {
         kind: "hands23".to_owned(),
@@ -122,7 +122,7 @@ fn place(name: &Name) -> (At, String) {
 }
 
 /// Pixels of a hand: `masks/2_{hand}_{image}.png`.
-fn mask(root: &Path, hand: &Prediction, name: &str) -> Result<Option<Blob>> {
+fn mask(root: &Path, hand: &Hands23Prediction, name: &str) -> Result<Option<Blob>> {
     let id = match &hand.hand_id {
         Some(serde_json::Value::Number(n)) => n.to_string(),
         Some(serde_json::Value::String(s)) => s.clone(),
@@ -140,7 +140,7 @@ mod tests {
         let path = dir.path().join("result.json");
         std::fs::write(&path, text).unwrap();
         assert!(detect(&path));
-        read(&path, &Options::default())
+        read(&path, &ImportOptions::default())
     }
 
     #[test]

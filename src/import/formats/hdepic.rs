@@ -9,12 +9,12 @@ use serde_json::Value;
 
 use super::aria::{device_times, pictures};
 use super::aria_camera;
-use super::aria_walk::{self, Rows};
+use super::aria_walk::{self, RowsKept};
 use crate::error::{Error, Result};
-use crate::import::Options;
+use crate::import::ImportOptions;
 use crate::import::blob::{files, inside};
-use crate::import::capture::{At, Capture, ClipAt, Missing, PoseAt, Poses, World};
-use crate::import::text::{Lines, Table};
+use crate::import::capture::{At, Capture, ClipAt, Missing, PoseAt, Poses, SourceWorld};
+use crate::import::text::{Lines, TextTable};
 
 /// The clock of one video: other recordings of the same glasses are not meant.
 const CLOCK: &str = "aria device";
@@ -29,7 +29,7 @@ const NARRATIONS: [&str; 4] = [
 ];
 
 /// Files of one video.
-struct Source {
+struct VideoFiles {
     /// The storage folder.
     root: PathBuf,
     /// The video's name.
@@ -38,7 +38,7 @@ struct Source {
     calibration: PathBuf,
 }
 
-impl Source {
+impl VideoFiles {
     fn of(trajectory: &Path) -> Option<Self> {
         let name = trajectory.file_stem()?.to_str()?.to_owned();
         let folder = trajectory.parent()?;
@@ -71,40 +71,17 @@ fn trajectories(path: &Path) -> Vec<PathBuf> {
 }
 
 pub(super) fn detect(path: &Path) -> bool {
-    trajectories(path).first().is_some_and(|t| Source::of(t).is_some_and(|s| s.calibration.is_file()))
+    trajectories(path).first().is_some_and(|t| VideoFiles::of(t).is_some_and(|s| s.calibration.is_file()))
 }
 
-pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
-    let found = trajectories(path);
-    let source = match found.as_slice() {
-        [one] => Source::of(one),
-        [] => None,
-        [first, ..] => {
-            let message =
-                format!("holds {} videos; name one of them, for example hdepic={}", found.len(), first.display());
-            return Err(Error::format(path, "videos", message));
-        }
-    };
-    let Some(source) = source else {
-        let message = "holds no intermediate_data/mp4_trajectory/VIDEO.csv (the data that HD-EPIC's tools name)";
-        return Err(Error::Io { path: path.to_owned(), message: message.to_owned() });
-    };
-    let walk = aria_walk::trajectory(&source.trajectory, Rows::Pictures)?;
+pub(super) fn read(path: &Path, _options: &ImportOptions) -> Result<Capture> {
+    let source = one_video(path)?;
+    let walk = aria_walk::trajectory(&source.trajectory, RowsKept::Pictures)?;
     let camera = aria_camera::exported(&source.calibration)?.upright();
     let (person, name) = (source.person(), &source.name);
     let mut notes =
         vec!["the video's pictures stand upright, rows of the trajectory are its pictures from 0".to_owned()];
-    // Seconds of the video and of the glasses, picture by picture.
-    let times = match inside(&source.root, &format!("Videos/{person}/{name}_mp4_to_vrs_time_ns.csv"))? {
-        Some(table) => device_times(&table)?,
-        None => {
-            notes.push(format!(
-                "no Videos/{person}/{name}_mp4_to_vrs_time_ns.csv: {FPS} pictures a second are taken for granted"
-            ));
-            let of = |p: &PoseAt| Some([p.at.index? as f64 / FPS, p.at.time_secs?]);
-            walk.items.iter().filter_map(of).collect()
-        }
-    };
+    let times = picture_times(&source, &walk.items, &mut notes)?;
     let video = inside(&source.root, &format!("Videos/{person}/{name}.mp4"))?;
     let images = match &video {
         Some(file) => pictures(file, &times.iter().map(|[_, device]| *device).collect::<Vec<f64>>()),
@@ -127,8 +104,9 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         title: format!("HD-EPIC video {name}"),
         licence: Some("HD-EPIC is CC BY-NC 4.0".to_owned()),
         notes,
+        dropped: walk.dropped.into_iter().collect(),
         clock: Some(CLOCK.to_owned()),
-        world: World { up: walk.up, ..World::default() },
+        world: SourceWorld { up: walk.up, ..SourceWorld::default() },
         optics: Some(camera.optics),
         poses: Some(Poses { body_from_camera: Some(camera.device_from_camera), items: walk.items, ..Poses::default() }),
         images,
@@ -137,6 +115,38 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         clips,
         ..Capture::default()
     })
+}
+
+/// The files of the one video that a path names.
+fn one_video(path: &Path) -> Result<VideoFiles> {
+    let found = trajectories(path);
+    let source = match found.as_slice() {
+        [one] => VideoFiles::of(one),
+        [] => None,
+        [first, ..] => {
+            let message =
+                format!("holds {} videos; name one of them, for example hdepic={}", found.len(), first.display());
+            return Err(Error::format(path, "videos", message));
+        }
+    };
+    let Some(source) = source else {
+        let message = "holds no intermediate_data/mp4_trajectory/VIDEO.csv (the data that HD-EPIC's tools name)";
+        return Err(Error::Io { path: path.to_owned(), message: message.to_owned() });
+    };
+    Ok(source)
+}
+
+/// Seconds of the video and of the glasses, picture by picture.
+fn picture_times(source: &VideoFiles, items: &[PoseAt], notes: &mut Vec<String>) -> Result<Vec<[f64; 2]>> {
+    let (person, name) = (source.person(), &source.name);
+    if let Some(table) = inside(&source.root, &format!("Videos/{person}/{name}_mp4_to_vrs_time_ns.csv"))? {
+        return device_times(&table);
+    }
+    notes.push(format!(
+        "no Videos/{person}/{name}_mp4_to_vrs_time_ns.csv: {FPS} pictures a second are taken for granted"
+    ));
+    let of = |p: &PoseAt| Some([p.at.index? as f64 / FPS, p.at.time_secs?]);
+    Ok(items.iter().filter_map(of).collect())
 }
 
 fn missing(no_clips: bool, no_video: bool) -> Vec<Missing> {
@@ -158,7 +168,7 @@ fn missing(no_clips: bool, no_video: bool) -> Vec<Missing> {
 }
 
 /// The points of the person's map that the video belongs to.
-fn points_file(source: &Source) -> Result<Option<PathBuf>> {
+fn points_file(source: &VideoFiles) -> Result<Option<PathBuf>> {
     let person = source.person();
     let maps = format!("SLAM-and-Gaze/{person}/SLAM/multi");
     let Some(table) = inside(&source.root, &format!("{maps}/vrs_to_multi_slam.json"))? else { return Ok(None) };
@@ -174,7 +184,7 @@ fn points_file(source: &Source) -> Result<Option<PathBuf>> {
 
 /// A narration as it stands in the file.
 #[derive(Default)]
-struct Told {
+struct NarrationEntry {
     name: String,
     narration: String,
     verb: String,
@@ -187,7 +197,7 @@ struct Told {
 fn narrations(file: &Path, video: &str, times: &[[f64; 2]]) -> Result<Vec<ClipAt>> {
     let is_lines = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("jsonl"));
     let told = if is_lines { of_lines(file, video)? } else { of_table(file, video)? };
-    let clip = |t: Told| {
+    let clip = |t: NarrationEntry| {
         let [start, end] = [device_time(times, t.start_secs)?, device_time(times, t.end_secs)?];
         Some(ClipAt {
             name: t.name,
@@ -201,8 +211,8 @@ fn narrations(file: &Path, video: &str, times: &[[f64; 2]]) -> Result<Vec<ClipAt
     Ok(told.into_iter().filter_map(clip).collect())
 }
 
-fn of_table(file: &Path, video: &str) -> Result<Vec<Told>> {
-    let mut table = Table::open(file)?;
+fn of_table(file: &Path, video: &str) -> Result<Vec<NarrationEntry>> {
+    let mut table = TextTable::open(file)?;
     table.need(&["video_id", "narration", "start_timestamp", "end_timestamp"])?;
     let mut out = Vec::new();
     while let Some(row) = table.row()? {
@@ -211,7 +221,7 @@ fn of_table(file: &Path, video: &str) -> Result<Vec<Told>> {
         }
         let [start_secs, end_secs] = row.numbers(["start_timestamp", "end_timestamp"])?;
         let first = |column: &str| first_word(row.text(column));
-        out.push(Told {
+        out.push(NarrationEntry {
             name: row.text("unique_narration_id").to_owned(),
             narration: row.text("narration").to_owned(),
             verb: first("verbs"),
@@ -223,7 +233,7 @@ fn of_table(file: &Path, video: &str) -> Result<Vec<Told>> {
     Ok(out)
 }
 
-fn of_lines(file: &Path, video: &str) -> Result<Vec<Told>> {
+fn of_lines(file: &Path, video: &str) -> Result<Vec<NarrationEntry>> {
     let mut lines = Lines::open(file)?;
     let mut out = Vec::new();
     while let Some(line) = lines.content()? {
@@ -236,7 +246,7 @@ fn of_lines(file: &Path, video: &str) -> Result<Vec<Told>> {
         };
         let text = |key: &str| json[key].as_str().unwrap_or_default().to_owned();
         let first = |key: &str| json[key][0].as_str().unwrap_or_default().to_owned();
-        out.push(Told {
+        out.push(NarrationEntry {
             name: text("unique_narration_id"),
             narration: text("narration"),
             verb: first("verbs"),

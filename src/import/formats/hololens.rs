@@ -13,13 +13,13 @@ use nalgebra::{Matrix4, Vector4};
 use crate::error::{Error, Result};
 use crate::import::blob::{Blob, files};
 use crate::import::capture::{
-    Along, At, CameraAxes, Capture, Depth, DepthAt, DepthCoding, HandAt, Hands, ImageAt, JointFrame, Missing, Picture,
-    PixelCoding, PoseAt, Poses, RawPose, World,
+    Along, At, CameraAxes, Capture, Depth, DepthAt, DepthCoding, HandAt, HandStream, ImageAt, ImageSource, JointFrame,
+    Missing, PixelCoding, PoseAt, Poses, RawPose, SourceWorld,
 };
-use crate::import::joints::JointOrder;
+use crate::import::joint_orders::JointOrder;
 use crate::import::optics::{Optics, from_corner};
-use crate::import::text::{Lines, cells};
-use crate::import::{Options, tar};
+use crate::import::text::{Lines, Unread, cells};
+use crate::import::{ImportOptions, tar};
 use crate::math::Vector;
 use crate::recording::Side;
 
@@ -49,14 +49,15 @@ fn secs(ticks: u64) -> f64 {
     (ticks / 10_000_000) as f64 - UNIX_SECS + (ticks % 10_000_000) as f64 * 1e-7
 }
 
-pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, _options: &ImportOptions) -> Result<Capture> {
     let Some(list) = ending(path, "pv.txt") else {
         let message = "holds no *_pv.txt; point at the folder of one recording";
         return Err(Error::Io { path: path.to_owned(), message: message.to_owned() });
     };
     let mut notes = Vec::new();
     let images = by_ticks(path, &["PV", "rgb"], &["png", "jpg", "bytes"])?;
-    let (poses, images) = posed(&list, &images)?;
+    let mut dropped = Vec::new();
+    let (poses, images) = posed(&list, &images, &mut dropped)?;
     let optics = poses.iter().find_map(|p| p.optics);
     let hands = match ending(path, "_eye.csv") {
         Some(file) => hands(&file)?,
@@ -73,13 +74,14 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         source: path.to_owned(),
         title: "HoloLens 2 recording (StreamRecorder)".to_owned(),
         notes,
+        dropped,
         clock: Some("unix".to_owned()),
-        world: World { up: Some(Vector::y()), ..World::default() },
+        world: SourceWorld { up: Some(Vector::y()), ..SourceWorld::default() },
         optics,
         poses: Some(Poses { axes: CameraAxes::Opengl, items: poses, ..Poses::default() }),
         images,
         depth,
-        hands: (!hands.is_empty()).then_some(Hands {
+        hands: (!hands.is_empty()).then_some(HandStream {
             frame: JointFrame::World,
             order: JointOrder::Openxr,
             unit_m: 1.0,
@@ -139,7 +141,11 @@ fn numbers<const N: usize>(lines: &Lines, cells: &[&str], first: usize) -> Resul
 }
 
 /// The colour camera's poses, and its images where they are there.
-fn posed(list: &Path, found: &BTreeMap<u64, (String, Blob)>) -> Result<(Vec<PoseAt>, Vec<ImageAt>)> {
+fn posed(
+    list: &Path,
+    found: &BTreeMap<u64, (String, Blob)>,
+    dropped: &mut Vec<String>,
+) -> Result<(Vec<PoseAt>, Vec<ImageAt>)> {
     let mut lines = Lines::open(list)?;
     let Some(first) = lines.content()? else {
         return Err(lines.fault("the file is empty; expected the principal point and the size first"));
@@ -150,11 +156,9 @@ fn posed(list: &Path, found: &BTreeMap<u64, (String, Blob)>) -> Result<(Vec<Pose
     }
     let (width, height) = (w as usize, h as usize);
     let (mut poses, mut images) = (Vec::new(), Vec::new());
+    let mut unread = Unread::default();
     while let Some(line) = lines.content()? {
-        let cells = cells(&line);
-        let ticks = ticks(&lines, cells.first())?;
-        let [fx, fy]: [f64; 2] = numbers(&lines, &cells, 1)?;
-        let matrix: [f64; MATRIX] = numbers(&lines, &cells, 3)?;
+        let Some((ticks, [fx, fy], matrix)) = unread.keep(picture_row(&lines, &line)) else { continue };
         let optics = Optics::pinhole(width, height, [fx, fy, from_corner(ox), from_corner(oy)]);
         let at = At::time(secs(ticks));
         // A camera that lost its place has a matrix of zeros, which is told as no rigid transform.
@@ -162,16 +166,23 @@ fn posed(list: &Path, found: &BTreeMap<u64, (String, Blob)>) -> Result<(Vec<Pose
         poses.push(PoseAt { at: at.clone(), pose, optics: Some(optics) });
         if let Some((kind, blob)) = found.get(&ticks) {
             let picture = match kind.as_str() {
-                "bytes" => Picture::Raw { blob: blob.clone(), width, height, coding: PixelCoding::Bgra },
-                _ => Picture::Still(blob.clone()),
+                "bytes" => ImageSource::Raw { blob: blob.clone(), width, height, coding: PixelCoding::Bgra },
+                _ => ImageSource::Still(blob.clone()),
             };
             images.push(ImageAt { at, picture, optics: Some(optics) });
         }
     }
+    dropped.extend(unread.told("poses", poses.len())?);
     if poses.is_empty() {
         return Err(lines.fault("there is no pose of the camera; was the recording stopped at once?"));
     }
     Ok((poses, images))
+}
+
+/// Ticks, focal lengths and the matrix of a row of the colour camera.
+fn picture_row(lines: &Lines, line: &str) -> Result<(u64, [f64; 2], [f64; MATRIX])> {
+    let cells = cells(line);
+    Ok((ticks(lines, cells.first())?, numbers(lines, &cells, 1)?, numbers(lines, &cells, 3)?))
 }
 
 /// Joints of tracked hands, world.

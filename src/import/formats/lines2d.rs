@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::import::Options;
+use crate::import::ImportOptions;
 use crate::import::blob::files;
 use crate::import::capture::{At, Capture, SegmentsAt};
 use crate::import::names::{numbered, stem};
@@ -37,7 +37,7 @@ pub(super) fn detect_limap(path: &Path) -> bool {
     path.is_dir() && !limap(path).is_empty()
 }
 
-pub(super) fn read_deeplsd(path: &Path, _options: &Options) -> Result<Capture> {
+pub(super) fn read_deeplsd(path: &Path, _options: &ImportOptions) -> Result<Capture> {
     let found = deeplsd(path).into_iter().map(|file| {
         let stem = stem(&file);
         let name = SUFFIXES.iter().find_map(|s| stem.strip_suffix(s)).unwrap_or(&stem).to_owned();
@@ -46,7 +46,7 @@ pub(super) fn read_deeplsd(path: &Path, _options: &Options) -> Result<Capture> {
     read(path, "deeplsd", "DeepLSD line segments", found.collect())
 }
 
-pub(super) fn read_limap(path: &Path, _options: &Options) -> Result<Capture> {
+pub(super) fn read_limap(path: &Path, _options: &ImportOptions) -> Result<Capture> {
     let names = image_list(path)?;
     let found = limap(path).into_iter().filter_map(|file| {
         let number = numbered(&stem(&file))?.1;
@@ -129,12 +129,12 @@ mod tests {
         std::fs::write(dir.path().join("000003_deeplsd.npz"), npz()).unwrap();
         std::fs::write(dir.path().join("000004_deeplsd_ext.npz"), &npz()[..40]).unwrap();
         assert!(detect_deeplsd(dir.path()) && !detect_limap(dir.path()));
-        let capture = read_deeplsd(dir.path(), &Options::default()).unwrap();
+        let capture = read_deeplsd(dir.path(), &ImportOptions::default()).unwrap();
         assert_eq!(capture.segments.len(), 1);
         assert_eq!(capture.segments[0].at.name.as_deref(), Some("000003"));
         assert_eq!(capture.segments[0].segments, [[[20.0, 10.0], [40.0, 30.0]]]);
         assert!(capture.notes[0].contains("000004_deeplsd_ext.npz"), "{:?}", capture.notes);
         std::fs::remove_file(dir.path().join("000003_deeplsd.npz")).unwrap();
-        assert!(read_deeplsd(dir.path(), &Options::default()).is_err());
+        assert!(read_deeplsd(dir.path(), &ImportOptions::default()).is_err());
     }
 }

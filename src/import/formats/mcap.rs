@@ -3,24 +3,22 @@
 //! Images and depth are told from each other by their encodings, cameras belong to the images of their name space or frame,
 //! poses are an odometry's, else poses with a time stamp, else those of tf. What is guessed is noted; `--topic` tells it.
 
+mod bag;
 mod choice;
 mod tracked;
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use bag::{Bag, ImageContent};
+
 use crate::error::{Error, Result};
-use crate::import::Options;
-use crate::import::blob::{Blob, files};
-use crate::import::capture::{At, ByteOrder, Capture, Depth, DepthAt, DepthCoding, ImageAt, Picture, PixelCoding};
-use crate::import::mcap::{Channel, Message, Visitor, Want, scan};
-use crate::import::ros::{self, CameraInfo, Header, Posed};
-use crate::import::tf::Tree;
+use crate::import::ImportOptions;
+use crate::import::blob::files;
+use crate::import::capture::{At, Capture, Depth, DepthAt, ImageAt};
+use crate::import::mcap_file::scan;
 
 /// Endings of the files that ROS records to.
 const ENDINGS: [&str; 4] = ["mcap", "db3", "bag", "zstd"];
-/// Bytes before the PNG in a compressed image of depth: how it was quantised.
-const DEPTH_HEADER_BYTES: usize = 12;
 /// Times after this are of the clock that counts from 1970, seconds.
 const YEAR_2001_SECS: f64 = 1e9;
 
@@ -35,7 +33,7 @@ pub(super) fn detect(path: &Path) -> bool {
     path.is_file() && ["mcap", "db3", "bag"].contains(&ending(path).as_str())
 }
 
-pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, options: &ImportOptions) -> Result<Capture> {
     let parts = if path.is_dir() { files(path, &ENDINGS) } else { vec![path.to_owned()] };
     let mut bag = Bag::default();
     let mut notes = Vec::new();
@@ -54,167 +52,7 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
     capture(path, &bag, notes, options)
 }
 
-/// What a topic's images are.
-enum Content {
-    /// A colour image.
-    Color(Picture),
-    /// Depth.
-    Depth(DepthCoding, Blob),
-    /// Something that is not read, in words.
-    Unread(String),
-}
-
-/// An image of a topic.
-struct Seen {
-    time_secs: f64,
-    frame: String,
-    content: Content,
-}
-
-/// What is kept of a recording's messages.
-#[derive(Default)]
-struct Bag {
-    images: BTreeMap<String, Vec<Seen>>,
-    cameras: BTreeMap<String, CameraInfo>,
-    poses: BTreeMap<String, Vec<Posed>>,
-    tree: Tree,
-    /// Messages that could not be read, by topic.
-    broken: BTreeMap<String, usize>,
-    /// All topics with their types.
-    topics: BTreeSet<String>,
-    /// Encodings other than ROS 2's of topics that would be read.
-    encodings: BTreeSet<String>,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Image,
-    Compressed,
-    Camera,
-    Pose,
-    Odometry,
-    Transforms,
-}
-
-/// By the type's name with or without the folder in its middle.
-fn kind(schema: &str) -> Option<Kind> {
-    let (package, name) = (schema.split('/').next()?, schema.rsplit('/').next()?);
-    match (package, name) {
-        ("sensor_msgs", "Image") => Some(Kind::Image),
-        ("sensor_msgs", "CompressedImage") => Some(Kind::Compressed),
-        ("sensor_msgs", "CameraInfo") => Some(Kind::Camera),
-        ("geometry_msgs", "PoseStamped" | "PoseWithCovarianceStamped") => Some(Kind::Pose),
-        ("nav_msgs", "Odometry") => Some(Kind::Odometry),
-        ("tf2_msgs" | "tf", "TFMessage" | "tfMessage") => Some(Kind::Transforms),
-        _ => None,
-    }
-}
-
-impl Visitor for Bag {
-    fn want(&mut self, channel: &Channel) -> Want {
-        self.topics.insert(format!("{} ({})", channel.topic, channel.schema));
-        match kind(&channel.schema) {
-            None => Want::Nothing,
-            Some(_) if channel.encoding != "cdr" => {
-                self.encodings.insert(channel.encoding.clone());
-                Want::Nothing
-            }
-            Some(Kind::Image | Kind::Compressed) => Want::Head,
-            Some(_) => Want::Whole,
-        }
-    }
-
-    fn take(&mut self, message: &Message<'_>) {
-        if self.add(message).is_none() {
-            *self.broken.entry(message.channel.topic.clone()).or_default() += 1;
-        }
-    }
-}
-
-impl Bag {
-    /// Keeps what a message says; `None` where it cannot be read.
-    fn add(&mut self, message: &Message<'_>) -> Option<()> {
-        let topic = message.channel.topic.clone();
-        let time_secs = |header: &Header| {
-            if header.time_secs > 0.0 { header.time_secs } else { 1e-9 * message.log_time_ns as f64 }
-        };
-        match kind(&message.channel.schema)? {
-            Kind::Image => {
-                let image = ros::image(message.bytes)?;
-                let content = raw(&image, message.piece(image.start, image.length)?);
-                let seen = Seen { time_secs: time_secs(&image.header), frame: image.header.frame, content };
-                self.images.entry(topic).or_default().push(seen);
-            }
-            Kind::Compressed => {
-                let image = ros::compressed(message.bytes)?;
-                let content = compressed(&image, message)?;
-                let seen = Seen { time_secs: time_secs(&image.header), frame: image.header.frame, content };
-                self.images.entry(topic).or_default().push(seen);
-            }
-            Kind::Camera => {
-                let camera = ros::camera_info(message.bytes)?;
-                self.cameras.entry(topic).or_insert(camera);
-            }
-            Kind::Pose | Kind::Odometry => {
-                let is_odometry = kind(&message.channel.schema) == Some(Kind::Odometry);
-                let mut posed =
-                    if is_odometry { ros::odometry(message.bytes)? } else { ros::pose_stamped(message.bytes)? };
-                posed.header.time_secs = time_secs(&posed.header);
-                self.poses.entry(topic).or_default().push(posed);
-            }
-            Kind::Transforms => {
-                for posed in ros::transforms(message.bytes)? {
-                    if let (Some(body), Some(pose)) = (&posed.body, ros::rigid(&posed.pose)) {
-                        self.tree.add(&posed.header.frame, body, time_secs(&posed.header), pose);
-                    }
-                }
-            }
-        }
-        Some(())
-    }
-}
-
-/// An image that is not compressed.
-fn raw(image: &ros::Image, blob: Blob) -> Content {
-    let (width, height) = (image.width, image.height);
-    let order = if image.is_bigendian { ByteOrder::Big } else { ByteOrder::Little };
-    let (bytes, content) = match image.encoding.as_str() {
-        "16UC1" | "mono16" => (2, Content::Depth(DepthCoding::RawU16 { width, height, order, unit_m: 1e-3 }, blob)),
-        "32FC1" => (4, Content::Depth(DepthCoding::RawF32 { width, height, order }, blob)),
-        other => {
-            let (bytes, coding) = match other {
-                "mono8" | "8UC1" => (1, PixelCoding::Grey),
-                "rgb8" => (3, PixelCoding::Rgb),
-                "bgr8" | "8UC3" => (3, PixelCoding::Bgr),
-                "rgba8" => (4, PixelCoding::Rgba { is_bottom_up: false }),
-                "bgra8" | "8UC4" => (4, PixelCoding::Bgra),
-                _ => return Content::Unread(format!("pixels of {other}")),
-            };
-            (bytes, Content::Color(Picture::Raw { blob, width, height, coding }))
-        }
-    };
-    if width.checked_mul(bytes) == Some(image.step) {
-        content
-    } else {
-        Content::Unread(format!("rows of {} bytes for {width} pixels of {}", image.step, image.encoding))
-    }
-}
-
-/// A compressed image; `None` where the message ends before.
-fn compressed(image: &ros::Compressed, message: &Message<'_>) -> Option<Content> {
-    if !image.format.contains("compressedDepth") {
-        return Some(Content::Color(Picture::Still(message.piece(image.start, image.length)?)));
-    }
-    // Quantised metres are another formula, and RVL is another packing.
-    if !image.format.starts_with("16UC1") || image.format.contains("rvl") {
-        return Some(Content::Unread(format!("depth compressed as {}", image.format)));
-    }
-    let length = image.length.checked_sub(DEPTH_HEADER_BYTES)?;
-    let blob = message.piece(image.start.checked_add(DEPTH_HEADER_BYTES)?, length)?;
-    Some(Content::Depth(DepthCoding::Png16 { unit_m: 1e-3 }, blob))
-}
-
-fn capture(path: &Path, bag: &Bag, mut notes: Vec<String>, options: &Options) -> Result<Capture> {
+fn capture(path: &Path, bag: &Bag, mut notes: Vec<String>, options: &ImportOptions) -> Result<Capture> {
     let choice = choice::choose(path, bag, options)?;
     // Where there are no images, depth stands for them.
     let view = choice.color.or(choice.depth);
@@ -262,7 +100,7 @@ fn capture(path: &Path, bag: &Bag, mut notes: Vec<String>, options: &Options) ->
 fn pictures(bag: &Bag, topic: &str) -> Vec<ImageAt> {
     let seen = bag.images.get(topic).into_iter().flatten();
     seen.filter_map(|seen| match &seen.content {
-        Content::Color(picture) => {
+        ImageContent::Color(picture) => {
             Some(ImageAt { at: At::time(seen.time_secs), picture: picture.clone(), optics: None })
         }
         _ => None,
@@ -274,13 +112,13 @@ fn pictures(bag: &Bag, topic: &str) -> Vec<ImageAt> {
 fn depth(bag: &Bag, topic: &str, color: Option<&str>, notes: &mut Vec<String>) -> Option<Depth> {
     let seen = bag.images.get(topic)?;
     let coding = seen.iter().find_map(|s| match &s.content {
-        Content::Depth(coding, _) => Some(coding.clone()),
+        ImageContent::Depth(coding, _) => Some(coding.clone()),
         _ => None,
     })?;
     let items: Vec<DepthAt> = seen
         .iter()
         .filter_map(|s| match &s.content {
-            Content::Depth(c, blob) if *c == coding => {
+            ImageContent::Depth(c, blob) if *c == coding => {
                 let at = At::time(s.time_secs);
                 Some(DepthAt { at, blob: blob.clone(), confidence: None, optics: None, pose: None })
             }

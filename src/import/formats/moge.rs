@@ -9,9 +9,9 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
-use crate::import::Options;
+use crate::import::ImportOptions;
 use crate::import::blob::{Blob, files, inside};
-use crate::import::capture::{At, Capture, Depth, DepthAt, DepthCoding, ImageAt, Normals, NormalsAt, Picture};
+use crate::import::capture::{At, Capture, Depth, DepthAt, DepthCoding, ImageAt, ImageSource, Normals, NormalsAt};
 use crate::import::names::{last, numbered};
 use crate::import::optics::{Optics, from_corner};
 
@@ -67,7 +67,7 @@ fn collect(path: &Path, depth: usize, out: &mut Vec<PathBuf>) {
     }
 }
 
-pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, _options: &ImportOptions) -> Result<Capture> {
     let mut found = Vec::new();
     collect(path, 0, &mut found);
     if found.is_empty() {
@@ -90,7 +90,7 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
             if optics.is_none() {
                 optics = guessed(folder, &file)?;
             }
-            images.push(ImageAt { at: at.clone(), picture: Picture::Still(Blob::File(file)), optics: None });
+            images.push(ImageAt { at: at.clone(), picture: ImageSource::Still(Blob::File(file)), optics: None });
         }
         let blob = Blob::File(folder.join("depth.exr"));
         depth.push(DepthAt { at, blob, confidence: None, optics: None, pose: None });

@@ -10,10 +10,10 @@ use std::path::Path;
 use serde_json::Value;
 
 use crate::error::{Error, Result};
-use crate::import::Options;
+use crate::import::ImportOptions;
 use crate::import::capture::{At, Capture, ClipAt};
 use crate::import::names::{ending, head, seconds};
-use crate::import::text::{Lines, Table};
+use crate::import::text::{Lines, TextTable};
 
 const TEXT: [&str; 7] = ["narration", "text", "caption", "sentence", "description", "label", "action"];
 const START: [&str; 8] =
@@ -41,7 +41,7 @@ const NOUN: [&str; 2] = ["noun", "nouns"];
 const TOLD: usize = 3;
 
 /// Cells of a narration by their names in lower case.
-type Row = BTreeMap<String, String>;
+type NarrationCells = BTreeMap<String, String>;
 
 pub(super) fn detect(path: &Path) -> bool {
     if is_pickle(path) {
@@ -69,7 +69,7 @@ fn has_word(text: &str, name: &str) -> bool {
     })
 }
 
-pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, _options: &ImportOptions) -> Result<Capture> {
     if is_pickle(path) {
         let message = "is a pickle, which is not read; write it as JSON lines: python3 -c \"import pandas, sys; \
                        pandas.read_pickle(sys.argv[1]).to_json('narrations.jsonl', orient='records', lines=True)\" FILE.pkl";
@@ -103,8 +103,8 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
     Ok(capture)
 }
 
-fn table(path: &Path) -> Result<Vec<(String, Row)>> {
-    let mut table = Table::open(path)?;
+fn table(path: &Path) -> Result<Vec<(String, NarrationCells)>> {
+    let mut table = TextTable::open(path)?;
     let known = [&TEXT[..], &START, &END, &START_FRAME, &END_FRAME, &NAME, &VIDEO, &VERB, &NOUN].concat();
     let known: Vec<&str> = known.into_iter().filter(|name| table.has(name)).collect();
     if !known.iter().any(|name| TEXT.contains(name)) {
@@ -124,7 +124,7 @@ fn table(path: &Path) -> Result<Vec<(String, Row)>> {
 }
 
 /// One object a line, or a list of them, which may stand in an object.
-fn objects(path: &Path) -> Result<Vec<(String, Row)>> {
+fn objects(path: &Path) -> Result<Vec<(String, NarrationCells)>> {
     if ending(path) == "json" {
         let value: Value = crate::json::read(path)?;
         let list = match &value {
@@ -151,8 +151,8 @@ fn objects(path: &Path) -> Result<Vec<(String, Row)>> {
     Ok(out)
 }
 
-fn cells_of(value: &Value) -> Row {
-    let Some(object) = value.as_object() else { return Row::new() };
+fn cells_of(value: &Value) -> NarrationCells {
+    let Some(object) = value.as_object() else { return NarrationCells::new() };
     object.iter().map(|(key, value)| (key.to_ascii_lowercase(), word(value))).collect()
 }
 
@@ -175,12 +175,12 @@ fn first_of_list(cell: &str) -> String {
 }
 
 /// The first of several cells that is there and not empty; "" where none is.
-fn cell<'a>(row: &'a Row, names: &[&str]) -> &'a str {
+fn cell<'a>(row: &'a NarrationCells, names: &[&str]) -> &'a str {
     names.iter().filter_map(|name| row.get(*name)).map(String::as_str).find(|text| !text.is_empty()).unwrap_or_default()
 }
 
 /// Where a narration begins or ends.
-fn place(row: &Row, times: &[&str], frames: &[&str], what: &str) -> std::result::Result<At, String> {
+fn place(row: &NarrationCells, times: &[&str], frames: &[&str], what: &str) -> std::result::Result<At, String> {
     let (time, frame) = (cell(row, times), cell(row, frames));
     let mut at = At::default();
     if !time.is_empty() {
@@ -200,7 +200,7 @@ fn place(row: &Row, times: &[&str], frames: &[&str], what: &str) -> std::result:
     Ok(at)
 }
 
-fn clip(row: &Row) -> std::result::Result<ClipAt, String> {
+fn clip(row: &NarrationCells) -> std::result::Result<ClipAt, String> {
     let narration = cell(row, &TEXT);
     if narration.is_empty() {
         return Err("has no narration".to_owned());
@@ -224,7 +224,7 @@ mod tests {
         let path = dir.path().join(name);
         std::fs::write(&path, text).unwrap();
         assert!(detect(&path), "{name}");
-        read(&path, &Options::default())
+        read(&path, &ImportOptions::default())
     }
 
     #[test]

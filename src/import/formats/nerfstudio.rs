@@ -10,20 +10,22 @@ use serde_json::Value;
 
 use super::cloud;
 use crate::error::{Error, Result};
-use crate::import::Options;
+use crate::import::ImportOptions;
 use crate::import::blob::{Blob, inside};
 use crate::import::capture::{
-    At, CameraAxes, Capture, Depth, DepthAt, DepthCoding, ImageAt, Missing, Picture, PoseAt, Poses, RawPose, World,
+    At, CameraAxes, Capture, Depth, DepthAt, DepthCoding, ImageAt, ImageSource, Missing, PoseAt, Poses, RawPose,
+    SourceWorld,
 };
 use crate::import::names::{ending, head};
-use crate::import::optics::{Lens, Optics, from_corner};
+use crate::import::optics::{LensModel, Optics, from_corner};
+use crate::import::text::Unread;
 
 /// Endings that Blender's sets leave out.
 const ENDINGS: [&str; 4] = ["", ".png", ".jpg", ".jpeg"];
 
 /// Intrinsics as far as they are there.
 #[derive(Clone, Default)]
-struct Intrinsics {
+struct NerfIntrinsics {
     camera_model: Option<String>,
     is_fisheye: Option<bool>,
     w: Option<f64>,
@@ -50,27 +52,25 @@ pub(super) fn detect(path: &Path) -> bool {
     file.is_file() && ending(&file) == "json" && head(&file, 1 << 16).contains("\"transform_matrix\"")
 }
 
-pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, _options: &ImportOptions) -> Result<Capture> {
     let file = file(path);
     let content: Value = crate::json::read(&file)?;
     let root = file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
-    let of_all = Intrinsics::of(&content).map_err(|e| Error::format(&file, "intrinsics", e))?;
+    let of_all = NerfIntrinsics::of(&content).map_err(|e| Error::format(&file, "intrinsics", e))?;
     let frames = frames(&content, &file)?;
     let (mut items, mut images, mut depth) = (Vec::new(), Vec::new(), Vec::new());
+    let mut unread = Unread::default();
     for (name, frame) in &frames {
         let fault = |message: String| {
             Error::format(&file, format!("frame {}", name.chars().take(80).collect::<String>()), message)
         };
         let found = image(root, name)?;
-        let own = Intrinsics::of(frame).map_err(fault)?;
-        let optics = own.over(&of_all).optics(found.as_deref()).map_err(fault)?;
-        let Some(pose) = frame.get("transform_matrix").and_then(matrix) else {
-            return Err(fault("transform_matrix must be 4 rows of 4 finite numbers".to_owned()));
-        };
+        let posed = placed(frame, &of_all, found.as_deref()).map_err(fault);
+        let Some((pose, optics)) = unread.keep(posed) else { continue };
         let at = At::name(name);
         items.push(PoseAt { at: at.clone(), pose, optics });
         if let Some(found) = found {
-            images.push(ImageAt { at: at.clone(), picture: Picture::Still(Blob::File(found)), optics });
+            images.push(ImageAt { at: at.clone(), picture: ImageSource::Still(Blob::File(found)), optics });
         }
         if let Some(name) = frame.get("depth_file_path").and_then(Value::as_str)
             && let Some(found) = inside(root, name)?
@@ -78,41 +78,26 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
             depth.push(DepthAt { at, blob: Blob::File(found), confidence: None, optics: None, pose: None });
         }
     }
+    let dropped = unread.told("frames", items.len())?;
     let points = match content.get("ply_file_path").and_then(Value::as_str) {
         Some(name) => inside(root, name)?.map(|p| cloud::points(&p)).transpose()?.unwrap_or_default(),
         None => Vec::new(),
     };
     let has_depth = !depth.is_empty();
-    let unit_m = content.get("depth_unit_scale_factor").and_then(Value::as_f64).unwrap_or(1e-3);
-    if !(unit_m.is_finite() && unit_m > 0.0) {
-        return Err(Error::format(
-            &file,
-            "depth_unit_scale_factor",
-            format!("{unit_m} is no unit; write 0.001 for mm"),
-        ));
-    }
+    let unit_m = depth_unit(&content, &file)?;
     let missing = images.is_empty().then(|| Missing {
         what: "images".to_owned(),
         why: "none of the images that transforms.json names lies beside it".to_owned(),
         command: "paws import transforms.json IMAGES --out DIR".to_owned(),
     });
-    let all = frames.len();
-    let mut notes = Vec::new();
-    if !images.is_empty() && images.len() < all {
-        notes.push(format!("{} of {all} images that transforms.json names are not there", all - images.len()));
-    }
-    notes.push(if has_depth {
-        "world in metres, as the depth images that transforms.json names; up is not told (--up z where it is z)"
-            .to_owned()
-    } else {
-        "neither unit nor up are told: --unit 1 --up z where it was made of poses in metres with z up".to_owned()
-    });
+    let notes = notes(frames.len(), images.len(), has_depth);
     Ok(Capture {
         kind: "nerfstudio".to_owned(),
         source: path.to_owned(),
         title: "nerfstudio transforms.json".to_owned(),
         notes,
-        world: World { up: None, unit_m: has_depth.then_some(1.0), left_handed: false },
+        dropped: dropped.into_iter().collect(),
+        world: SourceWorld { up: None, unit_m: has_depth.then_some(1.0), left_handed: false },
         optics: items.first().and_then(|i: &PoseAt| i.optics),
         poses: Some(Poses { axes: CameraAxes::Opengl, items, ..Poses::default() }),
         images,
@@ -121,6 +106,41 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         missing: missing.into_iter().collect(),
         ..Capture::default()
     })
+}
+
+/// Metres per count of the depth images.
+fn depth_unit(content: &Value, file: &Path) -> Result<f64> {
+    let unit_m = content.get("depth_unit_scale_factor").and_then(Value::as_f64).unwrap_or(1e-3);
+    if !(unit_m.is_finite() && unit_m > 0.0) {
+        return Err(Error::format(file, "depth_unit_scale_factor", format!("{unit_m} is no unit; write 0.001 for mm")));
+    }
+    Ok(unit_m)
+}
+
+/// What a user should know; `images` of `frames` images are there.
+fn notes(frames: usize, images: usize, has_depth: bool) -> Vec<String> {
+    let mut notes = Vec::new();
+    if images > 0 && images < frames {
+        notes.push(format!("{} of {frames} images that transforms.json names are not there", frames - images));
+    }
+    notes.push(if has_depth {
+        "world in metres, as the depth images that transforms.json names; up is not told (--up z where it is z)"
+            .to_owned()
+    } else {
+        "neither unit nor up are told: --unit 1 --up z where it was made of poses in metres with z up".to_owned()
+    });
+    notes
+}
+
+/// The pose and the camera of a frame.
+fn placed(
+    frame: &Value,
+    of_all: &NerfIntrinsics,
+    image: Option<&Path>,
+) -> std::result::Result<(RawPose, Option<Optics>), String> {
+    let optics = NerfIntrinsics::of(frame)?.over(of_all).optics(image)?;
+    let pose = frame.get("transform_matrix").and_then(matrix);
+    pose.map(|pose| (pose, optics)).ok_or_else(|| "transform_matrix must be 4 rows of 4 finite numbers".to_owned())
 }
 
 /// The image that a frame names, its ending given or not.
@@ -168,7 +188,7 @@ fn matrix(rows: &Value) -> Option<RawPose> {
     RawPose::from_rows(&numbers)
 }
 
-impl Intrinsics {
+impl NerfIntrinsics {
     /// Those that stand in an object.
     fn of(value: &Value) -> std::result::Result<Self, String> {
         let given = |key: &str| value.get(key).filter(|v| !v.is_null());
@@ -230,13 +250,13 @@ impl Intrinsics {
         let is_straight = [k1, k2, k3, k4, p1, p2].iter().all(|k| *k == 0.0);
         let model = self.camera_model.as_deref().unwrap_or("OPENCV");
         let lens = match model {
-            _ if self.is_fisheye == Some(true) => Lens::Fisheye { k: [k1, k2, k3, k4] },
-            "OPENCV_FISHEYE" => Lens::Fisheye { k: [k1, k2, k3, k4] },
-            "PINHOLE" | "SIMPLE_PINHOLE" => Lens::Pinhole,
-            "OPENCV" | "FULL_OPENCV" | "RADIAL" | "SIMPLE_RADIAL" if is_straight => Lens::Pinhole,
+            _ if self.is_fisheye == Some(true) => LensModel::Fisheye { k: [k1, k2, k3, k4] },
+            "OPENCV_FISHEYE" => LensModel::Fisheye { k: [k1, k2, k3, k4] },
+            "PINHOLE" | "SIMPLE_PINHOLE" => LensModel::Pinhole,
+            "OPENCV" | "FULL_OPENCV" | "RADIAL" | "SIMPLE_RADIAL" if is_straight => LensModel::Pinhole,
             "OPENCV" | "FULL_OPENCV" | "RADIAL" | "SIMPLE_RADIAL" => {
                 // Of the models here only the fisheye has a k4.
-                Lens::OpenCv { k: [k1, k2, k3, 0.0, 0.0, 0.0], p: [p1, p2] }
+                LensModel::OpenCv { k: [k1, k2, k3, 0.0, 0.0, 0.0], p: [p1, p2] }
             }
             other => {
                 let other: String = other.chars().take(40).collect();
@@ -261,8 +281,8 @@ impl Intrinsics {
 mod tests {
     use super::*;
 
-    fn intrinsics(text: &str) -> Intrinsics {
-        Intrinsics::of(&serde_json::from_str(text).unwrap()).unwrap()
+    fn intrinsics(text: &str) -> NerfIntrinsics {
+        NerfIntrinsics::of(&serde_json::from_str(text).unwrap()).unwrap()
     }
 
     #[test]
@@ -271,10 +291,10 @@ mod tests {
         let frame = intrinsics(r#"{"fl_x": 500, "fl_y": 510}"#);
         let optics = frame.over(&file).optics(None).unwrap().unwrap();
         assert_eq!((optics.fx, optics.fy, optics.cx), (500.0, 510.0, 319.5));
-        assert!(matches!(optics.lens, Lens::OpenCv { .. }));
+        assert!(matches!(optics.lens, LensModel::OpenCv { .. }));
         let blender = intrinsics(r#"{"w": 800, "h": 800, "camera_angle_x": 1.5707963267948966}"#);
         let optics = blender.optics(None).unwrap().unwrap();
-        assert!((optics.fx - 400.0).abs() < 1e-9 && optics.lens == Lens::Pinhole);
+        assert!((optics.fx - 400.0).abs() < 1e-9 && optics.lens == LensModel::Pinhole);
         assert!(intrinsics("{}").optics(None).unwrap().is_none());
         let other = intrinsics(r#"{"w": 8, "h": 8, "fl_x": 400, "camera_model": "EQUIRECTANGULAR"}"#);
         assert!(other.optics(None).unwrap_err().contains("undistorted"));
@@ -292,6 +312,6 @@ mod tests {
         ] {
             assert!(read(text).is_none(), "{text}");
         }
-        assert!(Intrinsics::of(&serde_json::json!({"fl_x": "wide"})).err().unwrap().contains("fl_x"));
+        assert!(NerfIntrinsics::of(&serde_json::json!({"fl_x": "wide"})).err().unwrap().contains("fl_x"));
     }
 }

@@ -8,10 +8,11 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
-use crate::import::Options;
+use crate::import::ImportOptions;
 use crate::import::blob::{Blob, files, inside};
 use crate::import::capture::{
-    At, CameraAxes, Capture, Depth, DepthAt, DepthCoding, ImageAt, Picture, PoseAt, Poses, RawPose, Turn, World,
+    At, CameraAxes, Capture, Depth, DepthAt, DepthCoding, ImageAt, ImageSource, PoseAt, Poses, RawPose, RawRotation,
+    SourceWorld,
 };
 use crate::import::optics::Optics;
 use crate::math::Vector;
@@ -33,7 +34,7 @@ pub(super) fn detect(path: &Path) -> bool {
 
 /// A file of a camera. Its other numbers (blur, neighbours) are not needed.
 #[derive(Deserialize)]
-struct Camera {
+struct PolycamCamera {
     fx: f64,
     fy: f64,
     cx: f64,
@@ -54,7 +55,7 @@ struct Camera {
     t_23: f64,
 }
 
-impl Camera {
+impl PolycamCamera {
     fn optics(&self) -> Optics {
         Optics::pinhole(self.width, self.height, [self.fx, self.fy, self.cx, self.cy])
     }
@@ -62,7 +63,7 @@ impl Camera {
     fn pose(&self) -> RawPose {
         RawPose {
             position: [self.t_03, self.t_13, self.t_23],
-            turn: Turn::Matrix([
+            turn: RawRotation::Matrix([
                 [self.t_00, self.t_01, self.t_02],
                 [self.t_10, self.t_11, self.t_12],
                 [self.t_20, self.t_21, self.t_22],
@@ -71,7 +72,7 @@ impl Camera {
     }
 }
 
-pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, _options: &ImportOptions) -> Result<Capture> {
     let root = keyframes(path);
     let is_corrected = ["corrected_cameras", "corrected_images"].iter().all(|n| root.join(n).is_dir());
     let (cameras, pictures) =
@@ -81,7 +82,7 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
     let mut first_fault: Option<Error> = None;
     let mut faults = 0;
     for file in &listed {
-        let camera: Camera = match crate::json::read(file) {
+        let camera: PolycamCamera = match crate::json::read(file) {
             Ok(camera) => camera,
             Err(error) => {
                 faults += 1;
@@ -95,7 +96,7 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         let optics = Some(camera.optics());
         poses.push(PoseAt { at: at.clone(), pose: camera.pose(), optics });
         if let Some(image) = inside(&root, &format!("{pictures}/{stem}.jpg"))? {
-            images.push(ImageAt { at: at.clone(), picture: Picture::Still(Blob::File(image)), optics });
+            images.push(ImageAt { at: at.clone(), picture: ImageSource::Still(Blob::File(image)), optics });
         }
         if let Some(image) = inside(&root, &format!("depth/{stem}.png"))? {
             let confidence = inside(&root, &format!("confidence/{stem}.png"))?.map(Blob::File);
@@ -120,7 +121,7 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         source: path.to_owned(),
         title: "Polycam raw data".to_owned(),
         notes,
-        world: World { up: Some(Vector::y()), ..World::default() },
+        world: SourceWorld { up: Some(Vector::y()), ..SourceWorld::default() },
         optics,
         poses: Some(Poses { axes: CameraAxes::Opengl, items: poses, ..Poses::default() }),
         images,

@@ -12,12 +12,12 @@ use serde_json::Value;
 use crate::error::{Error, Result};
 use crate::import::blob::{Blob, files, inside};
 use crate::import::capture::{
-    At, CameraAxes, Capture, Depth, DepthAt, DepthCoding, ImageAt, Missing, Picture, PixelCoding, PoseAt, Poses,
-    QuaternionOrder, RawPose, Turn, World,
+    At, CameraAxes, Capture, Depth, DepthAt, DepthCoding, ImageAt, ImageSource, Missing, PixelCoding, PoseAt, Poses,
+    QuaternionOrder, RawPose, RawRotation, SourceWorld,
 };
 use crate::import::optics::{Optics, from_corner};
-use crate::import::text::{Row, Table};
-use crate::import::{Options, axes};
+use crate::import::text::{TableRow, TextTable, Unread};
+use crate::import::{ImportOptions, axes};
 use crate::math::{Pose, Vector, stats};
 
 /// The clock of the headset since it was switched on, which streamed hands have too.
@@ -32,17 +32,18 @@ pub(super) fn detect(path: &Path) -> bool {
 }
 
 /// What is posed, and the images.
-struct Seen {
+struct QuestStreams {
     poses: Poses,
     optics: Optics,
     images: Vec<ImageAt>,
 }
 
-pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, _options: &ImportOptions) -> Result<Capture> {
     let mut notes = Vec::new();
-    let (head, offset) = head(&path.join(HEAD))?;
+    let mut dropped = Vec::new();
+    let (head, offset) = head(&path.join(HEAD), &mut dropped)?;
     let seen = if path.join(MRUK).is_file() {
-        mruk(path, offset, &mut notes)?
+        mruk(path, offset, &mut notes, &mut dropped)?
     } else {
         characterised(path, head, offset, &mut notes)?
     };
@@ -69,8 +70,9 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         source: path.to_owned(),
         title: "Quest recording (QuestRealityCapture), left camera".to_owned(),
         notes,
+        dropped,
         clock: Some(CLOCK.to_owned()),
-        world: World { up: Some(Vector::y()), unit_m: Some(1.0), left_handed: true },
+        world: SourceWorld { up: Some(Vector::y()), unit_m: Some(1.0), left_handed: true },
         optics: Some(seen.optics),
         poses: Some(seen.poses),
         images: seen.images,
@@ -85,17 +87,21 @@ fn unity(items: Vec<PoseAt>, body_from_camera: Option<Pose>) -> Poses {
 }
 
 /// Poses of the headset, and what is added to seconds since 1970 to be the running clock's.
-fn head(path: &Path) -> Result<(Vec<PoseAt>, f64)> {
-    let mut table = Table::open(path)?;
+fn head(path: &Path, dropped: &mut Vec<String>) -> Result<(Vec<PoseAt>, f64)> {
+    let mut table = TextTable::open(path)?;
     table.need(&["unix_time", "ovr_timestamp", "pos_x", "pos_y", "pos_z", "rot_x", "rot_y", "rot_z", "rot_w"])?;
     let (mut items, mut offsets) = (Vec::new(), Vec::new());
+    let mut unread = Unread::default();
     while let Some(row) = table.row()? {
-        let [unix_ms, running] = row.numbers(["unix_time", "ovr_timestamp"])?;
+        let times = row.numbers(["unix_time", "ovr_timestamp"]);
+        let pose = row.numbers(["pos_x", "pos_y", "pos_z", "rot_x", "rot_y", "rot_z", "rot_w"]);
+        let both = unread.keep(times.and_then(|times| Ok((times, pose?))));
+        let Some(([unix_ms, running], [x, y, z, a, b, c, d])) = both else { continue };
         offsets.push(running - unix_ms * 1e-3);
-        let position = row.numbers(["pos_x", "pos_y", "pos_z"])?;
-        let turn = Turn::Quaternion(row.numbers(["rot_x", "rot_y", "rot_z", "rot_w"])?);
+        let (position, turn) = ([x, y, z], RawRotation::Quaternion([a, b, c, d]));
         items.push(PoseAt { at: At::time(running), pose: RawPose { position, turn }, optics: None });
     }
+    dropped.extend(unread.told("poses of the headset", items.len())?);
     // Milliseconds are cut, not rounded, here as in the names of images: the median holds for both.
     let Some(offset) = stats::median(&offsets) else {
         return Err(Error::format(path, "rows", "there is no pose; was the recording stopped at once?"));
@@ -116,7 +122,7 @@ fn is_true(cell: &str) -> bool {
 }
 
 /// Images of the MRUK backend, each with its camera's pose; the first row of a file is the lowest one.
-fn mruk(path: &Path, offset: f64, notes: &mut Vec<String>) -> Result<Seen> {
+fn mruk(path: &Path, offset: f64, notes: &mut Vec<String>, dropped: &mut Vec<String>) -> Result<QuestStreams> {
     let file = path.join("left_camera_mruk_intrinsics.json");
     let json: Value = crate::json::read(&file)?;
     let of = |a: &str, b: &str| number(&json, &file, &[a, b]);
@@ -126,7 +132,7 @@ fn mruk(path: &Path, offset: f64, notes: &mut Vec<String>) -> Result<Seen> {
     if let Some(fault) = optics.fault() {
         return Err(Error::format(&file, "intrinsics", fault));
     }
-    let mut table = Table::open(&path.join(MRUK))?;
+    let mut table = TextTable::open(&path.join(MRUK))?;
     table.need(&["file_name", "timestamp_us_realtime", "width", "height", "pose_ok"])?;
     let (position, rotation) =
         (["pose_pos_x", "pose_pos_y", "pose_pos_z"], ["pose_rot_x", "pose_rot_y", "pose_rot_z", "pose_rot_w"]);
@@ -134,13 +140,18 @@ fn mruk(path: &Path, offset: f64, notes: &mut Vec<String>) -> Result<Seen> {
     table.need(&rotation)?;
     let (mut items, mut images) = (Vec::new(), Vec::new());
     let mut lost = 0;
+    let mut unread = Unread::default();
     while let Some(row) = table.row()? {
-        let at = At::time(row.number("timestamp_us_realtime")? * 1e-6 + offset);
         if !is_true(row.text("pose_ok")) {
             lost += 1;
             continue;
         }
-        let pose = RawPose { position: row.numbers(position)?, turn: Turn::Quaternion(row.numbers(rotation)?) };
+        let posed = || {
+            let at = At::time(row.number("timestamp_us_realtime")? * 1e-6 + offset);
+            let turn = RawRotation::Quaternion(row.numbers(rotation)?);
+            Ok::<_, Error>((at, RawPose { position: row.numbers(position)?, turn }))
+        };
+        let Some((at, pose)) = unread.keep(posed()) else { continue };
         items.push(PoseAt { at: at.clone(), pose, optics: None });
         let (width, height) = (row.whole("width")?, row.whole("height")?);
         let name = row.text("file_name");
@@ -149,18 +160,19 @@ fn mruk(path: &Path, offset: f64, notes: &mut Vec<String>) -> Result<Seen> {
         }
         if let Some(file) = inside(path, &format!("left_camera_mruk_rgba/{name}"))? {
             let coding = PixelCoding::Rgba { is_bottom_up: true };
-            let picture = Picture::Raw { blob: Blob::File(file), width, height, coding };
+            let picture = ImageSource::Raw { blob: Blob::File(file), width, height, coding };
             images.push(ImageAt { at, picture, optics: None });
         }
     }
     if lost > 0 {
         notes.push(format!("{lost} images have no pose and were left out"));
     }
-    Ok(Seen { poses: unity(items, None), optics, images })
+    dropped.extend(unread.told("poses of images", items.len())?);
+    Ok(QuestStreams { poses: unity(items, None), optics, images })
 }
 
 /// The headset's poses and the camera on it, of Android's characteristics.
-fn characterised(path: &Path, head: Vec<PoseAt>, offset: f64, notes: &mut Vec<String>) -> Result<Seen> {
+fn characterised(path: &Path, head: Vec<PoseAt>, offset: f64, notes: &mut Vec<String>) -> Result<QuestStreams> {
     let file = path.join("left_camera_characteristics.json");
     if !file.is_file() {
         return depth_alone(path, head, notes);
@@ -191,7 +203,7 @@ fn characterised(path: &Path, head: Vec<PoseAt>, offset: f64, notes: &mut Vec<St
     for (ms, picture) in android_images(path, notes)? {
         images.push(ImageAt { at: At::time(ms * 1e-3 + offset), picture, optics: None });
     }
-    Ok(Seen { poses: unity(head, Some(body_from_camera)), optics, images })
+    Ok(QuestStreams { poses: unity(head, Some(body_from_camera)), optics, images })
 }
 
 /// The camera (OpenCV axes) on the headset (OpenCV axes) from Android's lens pose: right-handed with +Y up and -Z ahead, the
@@ -209,11 +221,11 @@ fn lens([x, y, z]: [f64; 3], [qx, qy, qz, qw]: [f64; 4]) -> Option<Pose> {
 }
 
 /// Images of the other backend with their times, milliseconds since 1970: converted ones, else the raw planes.
-fn android_images(path: &Path, notes: &mut Vec<String>) -> Result<Vec<(f64, Picture)>> {
+fn android_images(path: &Path, notes: &mut Vec<String>) -> Result<Vec<(f64, ImageSource)>> {
     let time = |file: &PathBuf| file.file_stem()?.to_str()?.parse::<f64>().ok().filter(|t| t.is_finite());
     let stills = files(&path.join("left_camera_rgb"), &["png", "jpg"]);
     if !stills.is_empty() {
-        return Ok(stills.into_iter().filter_map(|f| Some((time(&f)?, Picture::Still(Blob::File(f))))).collect());
+        return Ok(stills.into_iter().filter_map(|f| Some((time(&f)?, ImageSource::Still(Blob::File(f))))).collect());
     }
     let raw = files(&path.join("left_camera_raw"), &["yuv"]);
     let file = path.join("left_camera_image_format.json");
@@ -236,23 +248,24 @@ fn android_images(path: &Path, notes: &mut Vec<String>) -> Result<Vec<(f64, Pict
     let last = if u[2] == 2 { y[0] + 1 } else { y[0] + u[0] };
     let coding = PixelCoding::Yuv420 { offsets: [0, y[0], last], rows: [y[1], u[1], v[1]], steps: [y[2], u[2], v[2]] };
     notes.push("images are raw planes, whose second one is taken for blue".to_owned());
-    let picture = |file: PathBuf| Some((time(&file)?, Picture::Raw { blob: Blob::File(file), width, height, coding }));
+    let picture =
+        |file: PathBuf| Some((time(&file)?, ImageSource::Raw { blob: Blob::File(file), width, height, coding }));
     Ok(raw.into_iter().filter_map(picture).collect())
 }
 
 /// Without a camera the headset looks with the depth camera's field of view; depth itself has its own poses.
-fn depth_alone(path: &Path, head: Vec<PoseAt>, notes: &mut Vec<String>) -> Result<Seen> {
-    let mut table = Table::open(&path.join(DEPTH))?;
+fn depth_alone(path: &Path, head: Vec<PoseAt>, notes: &mut Vec<String>) -> Result<QuestStreams> {
+    let mut table = TextTable::open(&path.join(DEPTH))?;
     let optics = match table.row()? {
         Some(row) => described(&row)?,
         None => return Err(Error::format(&path.join(DEPTH), "rows", "there is none, and no camera either")),
     };
     notes.push("no camera was recorded: the depth camera's view from the headset stands for it".to_owned());
-    Ok(Seen { poses: unity(head, None), optics, images: Vec::new() })
+    Ok(QuestStreams { poses: unity(head, None), optics, images: Vec::new() })
 }
 
 /// The depth camera of a row, from the tangents of its field of view.
-fn described(row: &Row<'_>) -> Result<Optics> {
+fn described(row: &TableRow<'_>) -> Result<Optics> {
     let [left, right, top, down] = row.numbers([
         "fov_left_angle_tangent",
         "fov_right_angle_tangent",
@@ -276,7 +289,7 @@ fn described(row: &Row<'_>) -> Result<Optics> {
 
 /// The left depth camera's images, each with its own pose; the top row first.
 fn depth(path: &Path, offset: f64, notes: &mut Vec<String>) -> Result<Option<Depth>> {
-    let mut table = Table::open(&path.join(DEPTH))?;
+    let mut table = TextTable::open(&path.join(DEPTH))?;
     table.need(&["timestamp_ms", "near_z", "far_z", "width", "height"])?;
     let position = ["x", "y", "z"].map(|c| format!("create_pose_location_{c}"));
     let rotation = ["x", "y", "z", "w"].map(|c| format!("create_pose_rotation_{c}"));
@@ -302,7 +315,7 @@ fn depth(path: &Path, offset: f64, notes: &mut Vec<String>) -> Result<Option<Dep
             lost += 1;
             continue;
         };
-        let pose = RawPose { position: row.numbers(position)?, turn: Turn::Quaternion(row.numbers(rotation)?) };
+        let pose = RawPose { position: row.numbers(position)?, turn: RawRotation::Quaternion(row.numbers(rotation)?) };
         items.push(DepthAt {
             at: At::time(ms as f64 * 1e-3 + offset),
             blob: Blob::File(file),

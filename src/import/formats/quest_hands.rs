@@ -12,11 +12,12 @@ use nalgebra::{Quaternion, UnitQuaternion};
 use super::quest::CLOCK;
 use crate::error::{Error, Result};
 use crate::import::capture::{
-    At, CameraAxes, Capture, HandAt, Hands, JointFrame, PoseAt, Poses, QuaternionOrder, RawPose, Turn, World,
+    At, CameraAxes, Capture, HandAt, HandStream, JointFrame, PoseAt, Poses, QuaternionOrder, RawPose, RawRotation,
+    SourceWorld,
 };
-use crate::import::joints::JointOrder;
+use crate::import::joint_orders::JointOrder;
 use crate::import::text::Lines;
-use crate::import::{Options, axes};
+use crate::import::{ImportOptions, axes};
 use crate::math::{Pose, Vector};
 use crate::recording::Side;
 
@@ -25,27 +26,27 @@ const JOINTS: usize = 21;
 
 /// What a line is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum About {
+enum LineSubject {
     Wrist(Side),
     Landmarks(Side),
     Head,
 }
 
 /// What a line is about, its time in seconds, and its numbers as text. `None` for other lines.
-fn parts(line: &str) -> Option<(About, Option<f64>, &str)> {
+fn parts(line: &str) -> Option<(LineSubject, Option<f64>, &str)> {
     let (head, numbers) = line.split_once(':')?;
     let mut words = head.split('|').map(str::trim);
-    let about = match words.next()? {
-        "Left wrist" => About::Wrist(Side::Left),
-        "Right wrist" => About::Wrist(Side::Right),
-        "Left landmarks" => About::Landmarks(Side::Left),
-        "Right landmarks" => About::Landmarks(Side::Right),
-        "Head pose" => About::Head,
+    let subject = match words.next()? {
+        "Left wrist" => LineSubject::Wrist(Side::Left),
+        "Right wrist" => LineSubject::Wrist(Side::Right),
+        "Left landmarks" => LineSubject::Landmarks(Side::Left),
+        "Right landmarks" => LineSubject::Landmarks(Side::Right),
+        "Head pose" => LineSubject::Head,
         _ => return None,
     };
     let time = words.filter_map(|w| w.split_once('=')).find(|(key, _)| key.trim() == "t");
     let secs = time.and_then(|(_, ns)| ns.trim().parse::<u64>().ok()).map(|ns| ns as f64 * 1e-9);
-    Some((about, secs, numbers))
+    Some((subject, secs, numbers))
 }
 
 pub(super) fn detect(path: &Path) -> bool {
@@ -71,49 +72,68 @@ fn pose(values: &[f64]) -> Option<(RawPose, Pose)> {
     let [x, y, z, a, b, c, d] = *values else { return None };
     axes::quaternion([a, b, c, d], QuaternionOrder::Xyzw)?;
     let turn = UnitQuaternion::from_quaternion(Quaternion::new(d, a, b, c));
-    let raw = RawPose { position: [x, y, z], turn: Turn::Quaternion(turn.coords.into()) };
+    let raw = RawPose { position: [x, y, z], turn: RawRotation::Quaternion(turn.coords.into()) };
     Some((raw, Pose::from_parts(Vector::new(x, y, z).into(), turn)))
 }
 
-pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
-    let mut lines = Lines::open(path)?;
-    let (mut head, mut items) = (Vec::new(), Vec::new());
-    let mut wrists: BTreeMap<Side, Pose> = BTreeMap::new();
-    let (mut timeless, mut other) = (0, 0);
-    while let Some(line) = lines.content()? {
-        let Some((about, secs, text)) = parts(&line) else {
-            other += 1;
-            continue;
+/// What has been read of a file.
+#[derive(Default)]
+struct Packets {
+    head: Vec<PoseAt>,
+    hands: Vec<HandAt>,
+    /// The wrist of each hand whose joints have not come yet.
+    wrists: BTreeMap<Side, Pose>,
+    /// Lines without a time, and lines of something else.
+    timeless: usize,
+    other: usize,
+}
+
+impl Packets {
+    /// Takes one line.
+    fn take(&mut self, lines: &Lines, line: &str) -> Result<()> {
+        let Some((subject, secs, text)) = parts(line) else {
+            self.other += 1;
+            return Ok(());
         };
         let Some(secs) = secs else {
-            timeless += 1;
-            continue;
+            self.timeless += 1;
+            return Ok(());
         };
-        match about {
-            About::Head => {
-                let values = numbers(&lines, text, 7)?;
-                head.extend(pose(&values).map(|(raw, _)| PoseAt { at: At::time(secs), pose: raw, optics: None }));
+        match subject {
+            LineSubject::Head => {
+                let values = numbers(lines, text, 7)?;
+                self.head.extend(pose(&values).map(|(raw, _)| PoseAt { at: At::time(secs), pose: raw, optics: None }));
             }
-            About::Wrist(side) => {
-                let values = numbers(&lines, text, 7)?;
+            LineSubject::Wrist(side) => {
+                let values = numbers(lines, text, 7)?;
                 match pose(&values) {
-                    Some((_, wrist)) => wrists.insert(side, wrist),
-                    None => wrists.remove(&side),
+                    Some((_, wrist)) => self.wrists.insert(side, wrist),
+                    None => self.wrists.remove(&side),
                 };
             }
-            About::Landmarks(side) => {
-                let values = numbers(&lines, text, 3 * JOINTS)?;
+            LineSubject::Landmarks(side) => {
+                let values = numbers(lines, text, 3 * JOINTS)?;
                 // The wrist of the same packet stands in the line before; one wrist serves one hand.
-                let Some(wrist) = wrists.remove(&side) else { continue };
+                let Some(wrist) = self.wrists.remove(&side) else { return Ok(()) };
                 let joint = |p: &[f64]| -> Option<[f64; 3]> {
                     let [x, y, z] = *p else { return None };
                     Some((wrist.translation.vector + wrist.rotation * Vector::new(x, y, z)).into())
                 };
                 let joints = values.chunks_exact(3).map(joint).collect();
-                items.push(HandAt { at: At::time(secs), side, joints, contact: None, score: None });
+                self.hands.push(HandAt { at: At::time(secs), side, joints, contact: None, score: None });
             }
         }
+        Ok(())
     }
+}
+
+pub(super) fn read(path: &Path, _options: &ImportOptions) -> Result<Capture> {
+    let mut lines = Lines::open(path)?;
+    let mut packets = Packets::default();
+    while let Some(line) = lines.content()? {
+        packets.take(&lines, &line)?;
+    }
+    let Packets { head, hands: items, timeless, other, .. } = packets;
     if items.is_empty() && head.is_empty() {
         let message = format!(
             "none of its lines has a time ({timeless} of wrists, hands and head without one): switch \"Show debug info\" on in \
@@ -134,9 +154,9 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         title: "Hand Tracking Streamer (Quest)".to_owned(),
         notes,
         clock: Some(CLOCK.to_owned()),
-        world: World { up: Some(Vector::y()), unit_m: Some(1.0), left_handed: true },
+        world: SourceWorld { up: Some(Vector::y()), unit_m: Some(1.0), left_handed: true },
         poses: (!head.is_empty()).then(|| Poses { axes: CameraAxes::Unity, items: head, ..Poses::default() }),
-        hands: (!items.is_empty()).then_some(Hands {
+        hands: (!items.is_empty()).then_some(HandStream {
             frame: JointFrame::World,
             order: JointOrder::Mano,
             unit_m: 1.0,
@@ -152,9 +172,9 @@ mod tests {
 
     #[test]
     fn lines_say_what_they_are_about_and_when() {
-        assert_eq!(parts("Left wrist:, 1, 2"), Some((About::Wrist(Side::Left), None, ", 1, 2")));
+        assert_eq!(parts("Left wrist:, 1, 2"), Some((LineSubject::Wrist(Side::Left), None, ", 1, 2")));
         let (about, secs, _) = parts("Right landmarks | f = 7 | t = 2500000000:, 1").unwrap();
-        assert_eq!((about, secs), (About::Landmarks(Side::Right), Some(2.5)));
+        assert_eq!((about, secs), (LineSubject::Landmarks(Side::Right), Some(2.5)));
         assert_eq!(parts("1.0 2.0"), None);
     }
 
@@ -170,10 +190,10 @@ mod tests {
         );
         std::fs::write(&path, text).unwrap();
         assert!(detect(&path));
-        let hands = read(&path, &Options::default()).unwrap().hands.unwrap();
+        let hands = read(&path, &ImportOptions::default()).unwrap().hands.unwrap();
         let [x, y, z] = hands.items[0].joints[20].unwrap();
         assert!((x - 1.0).abs() < 1e-4 && y == 2.0 && (z - 2.9).abs() < 1e-4, "{x} {y} {z}");
         std::fs::write(&path, "Left wrist:, 1, 2, 3, 0, 0, 0, 1\n").unwrap();
-        assert!(read(&path, &Options::default()).unwrap_err().to_string().contains("debug info"));
+        assert!(read(&path, &ImportOptions::default()).unwrap_err().to_string().contains("debug info"));
     }
 }

@@ -9,12 +9,12 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
-use crate::import::Options;
+use crate::import::ImportOptions;
 use crate::import::axes::quaternion;
 use crate::import::blob::{Blob, Packing, entries, inside};
 use crate::import::capture::{
-    At, ByteOrder, CameraAxes, Capture, Depth, DepthAt, DepthCoding, ImageAt, Picture, PoseAt, Poses, QuaternionOrder,
-    RawPose, Turn, World,
+    At, ByteOrder, CameraAxes, Capture, Depth, DepthAt, DepthCoding, ImageAt, ImageSource, PoseAt, Poses,
+    QuaternionOrder, RawPose, RawRotation, SourceWorld,
 };
 use crate::import::optics::Optics;
 use crate::math::Vector;
@@ -73,7 +73,7 @@ impl Files {
     }
 }
 
-pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, _options: &ImportOptions) -> Result<Capture> {
     let files = Files::of(path)?;
     let Some(metadata) = files.get("metadata", "metadata.json")? else {
         return Err(Error::format(path, "metadata", "is not in the archive; was it copied as a whole?"));
@@ -92,10 +92,10 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         let at = metadata.at(index);
         let optics = metadata.cameras.as_ref().and_then(|c| c.get(index)).map(|f| metadata.optics(*f));
         let [a, b, c, d, x, y, z] = *pose;
-        let pose = RawPose { position: [x, y, z], turn: Turn::Quaternion([a, b, c, d]) };
+        let pose = RawPose { position: [x, y, z], turn: RawRotation::Quaternion([a, b, c, d]) };
         poses.push(PoseAt { at: at.clone(), pose, optics });
         if let Some(blob) = files.get(&format!("rgbd/{index}.jpg"), &format!("rgb/{index}.jpg"))? {
-            images.push(ImageAt { at: at.clone(), picture: Picture::Still(blob), optics });
+            images.push(ImageAt { at: at.clone(), picture: ImageSource::Still(blob), optics });
         }
         if let Some(blob) = files.get(&format!("rgbd/{index}.depth"), &format!("depth/{index}.exr"))? {
             let confidence = files.get(&format!("rgbd/{index}.conf"), &format!("conf/{index}.png"))?;
@@ -110,7 +110,7 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         source: path.to_owned(),
         title: "Record3D recording".to_owned(),
         notes,
-        world: World { up, ..World::default() },
+        world: SourceWorld { up, ..SourceWorld::default() },
         optics: Some(metadata.optics(metadata.common())),
         poses: Some(Poses { axes: CameraAxes::Opengl, items: poses, ..Poses::default() }),
         images,

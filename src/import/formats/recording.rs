@@ -8,15 +8,15 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::error::{Error, Result};
-use crate::import::Options;
+use crate::import::ImportOptions;
 use crate::import::blob::{Blob, inside};
 use crate::import::capture::{
-    At, Capture, ClipAt, Depth, DepthAt, DepthCoding, HandAt, Hands, ImageAt, JointFrame, Layer, MaskAt, Masks,
-    Normals, NormalsAt, Picture, PoseAt, Poses, RawPose, SegmentsAt, Turn, World,
+    At, Capture, ClipAt, Depth, DepthAt, DepthCoding, HandAt, HandStream, ImageAt, ImageSource, JointFrame, Layer,
+    MaskAt, Masks, Normals, NormalsAt, PoseAt, Poses, RawPose, RawRotation, SegmentsAt, SourceWorld,
 };
-use crate::import::joints::{JointOrder, TIPS};
+use crate::import::joint_orders::{JointOrder, TIPS};
 use crate::import::optics::Optics;
-use crate::import::text::Table;
+use crate::import::text::TextTable;
 use crate::math::Vector;
 use crate::recording::tables::{self, CamerasFile, ClipsFile, FrameEntry, HandsFile, HandsFrame};
 use crate::recording::{Side, reconstruction, segments};
@@ -32,7 +32,7 @@ pub(super) fn detect(path: &Path) -> bool {
     has("cameras.json") && ["import.json", "clips.json", "hands.json", "fingertips.csv"].iter().any(|name| has(name))
 }
 
-pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, _options: &ImportOptions) -> Result<Capture> {
     let file = path.join("cameras.json");
     let cameras: CamerasFile = crate::json::read(&file)?;
     let optics = Optics::pinhole(cameras.width, cameras.height, [cameras.fx, cameras.fy, cameras.cx, cameras.cy]);
@@ -43,7 +43,7 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         kind: "recording".to_owned(),
         source: path.to_owned(),
         title: "a recording of ours".to_owned(),
-        world: World { up: Some(Vector::z()), ..World::default() },
+        world: SourceWorld { up: Some(Vector::z()), ..SourceWorld::default() },
         optics: Some(optics),
         ..Capture::default()
     };
@@ -80,10 +80,10 @@ fn frames(path: &Path, rows: &[FrameEntry], out: &mut Capture) -> Result<()> {
         };
         let timed = At { time_secs: Some(row.timestamp).filter(|t| t.is_finite()), ..at.clone() };
         let [w, x, y, z] = row.rotation_wxyz;
-        let pose = RawPose { position: row.position, turn: Turn::Quaternion([x, y, z, w]) };
+        let pose = RawPose { position: row.position, turn: RawRotation::Quaternion([x, y, z, w]) };
         poses.push(PoseAt { at: timed.clone(), pose, optics: None });
         if let Some(image) = image {
-            out.images.push(ImageAt { at: timed, picture: Picture::Still(Blob::File(image)), optics: None });
+            out.images.push(ImageAt { at: timed, picture: ImageSource::Still(Blob::File(image)), optics: None });
         }
         if let Some(file) = of("depth")? {
             let blob = Blob::File(file);
@@ -141,13 +141,13 @@ fn clips(path: &Path, times: &[f64]) -> Result<Vec<ClipAt>> {
         .collect())
 }
 
-fn hands(path: &Path) -> Result<Option<Hands>> {
+fn hands(path: &Path) -> Result<Option<HandStream>> {
     let items = match (inside(path, "hands.json")?, inside(path, "fingertips.csv")?) {
         (Some(file), _) => joints(&file)?,
         (None, Some(file)) => fingertips(&file)?,
         (None, None) => return Ok(None),
     };
-    Ok(Some(Hands { frame: JointFrame::World, order: JointOrder::Mano, unit_m: 1.0, items }))
+    Ok(Some(HandStream { frame: JointFrame::World, order: JointOrder::Mano, unit_m: 1.0, items }))
 }
 
 /// `hands.json`: all joints.
@@ -169,7 +169,7 @@ fn joints(file: &Path) -> Result<Vec<HandAt>> {
 fn fingertips(file: &Path) -> Result<Vec<HandAt>> {
     const COLUMNS: [[&str; 3]; 3] =
         [["thumb_x", "thumb_y", "thumb_z"], ["index_x", "index_y", "index_z"], ["middle_x", "middle_y", "middle_z"]];
-    let mut table = Table::open(file)?;
+    let mut table = TextTable::open(file)?;
     table.need(&["frame", "side"])?;
     table.need(COLUMNS.as_flattened())?;
     let mut out = Vec::new();

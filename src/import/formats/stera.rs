@@ -9,14 +9,14 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
-use crate::import::Options;
+use crate::import::ImportOptions;
 use crate::import::blob::{Blob, beside};
 use crate::import::capture::{
-    At, ByteOrder, CameraAxes, Capture, Depth, DepthAt, DepthCoding, HandAt, Hands, ImageAt, JointFrame, Picture,
-    PoseAt, Poses, RawPose, Turn, World,
+    At, ByteOrder, CameraAxes, Capture, Depth, DepthAt, DepthCoding, HandAt, HandStream, ImageAt, ImageSource,
+    JointFrame, PoseAt, Poses, RawPose, RawRotation, SourceWorld,
 };
 use crate::import::h5::{Hdf5, is_hdf5};
-use crate::import::joints::JointOrder;
+use crate::import::joint_orders::JointOrder;
 use crate::import::optics::Optics;
 use crate::math::{Pose, Vector};
 use crate::recording::Side;
@@ -35,14 +35,14 @@ pub(super) fn detect(path: &Path) -> bool {
     is_named && is_hdf5(&file) && Hdf5::open(&file).is_ok_and(|h5| h5.has("cam-pose/translations"))
 }
 
-pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, options: &ImportOptions) -> Result<Capture> {
     if path.extension().is_some_and(|e| e == "mcap") {
         return super::mcap::read(path, options);
     }
     let file = annotation(path);
     let h5 = Hdf5::open(&file)?;
     let mut notes = Vec::new();
-    let calibration = Calibration::of(&file)?;
+    let calibration = SteraCalibration::of(&file)?;
     let times = times(&h5)?;
     let images = match beside(&file, "rgb.mp4")? {
         Some(video) => pictures(&video, &times),
@@ -62,7 +62,7 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
         kind: "stera".to_owned(),
         source: path.to_owned(),
         title: "episode of the Stera SDK".to_owned(),
-        world: World { up: Some(Vector::y()), ..World::default() },
+        world: SourceWorld { up: Some(Vector::y()), ..SourceWorld::default() },
         optics: calibration.as_ref().and_then(|c| c.color),
         poses: Some(Poses { items: poses(&h5)?, body_from_camera: Some(body), ..Poses::default() }),
         images,
@@ -94,7 +94,7 @@ fn times(h5: &Hdf5) -> Result<Vec<Option<f64>>> {
 
 fn pictures(video: &Path, times: &[Option<f64>]) -> Vec<ImageAt> {
     let pictures = times.iter().enumerate().filter_map(|(index, t)| {
-        let picture = Picture::Video { file: video.to_owned(), index, upright: false };
+        let picture = ImageSource::Video { file: video.to_owned(), index, upright: false };
         Some(ImageAt { at: At::time((*t)?).with_index(index), picture, optics: None })
     });
     pictures.collect()
@@ -110,7 +110,7 @@ fn poses(h5: &Hdf5) -> Result<Vec<PoseAt>> {
     }
     let poses = times.iter().zip(positions.chunks_exact(3)).zip(turns.chunks_exact(9)).filter_map(|((t, p), r)| {
         let (&[x, y, z], &[a, b, c, d, e, f, g, h, i]) = (p, r) else { return None };
-        let pose = RawPose { position: [x, y, z], turn: Turn::Matrix([[a, b, c], [d, e, f], [g, h, i]]) };
+        let pose = RawPose { position: [x, y, z], turn: RawRotation::Matrix([[a, b, c], [d, e, f], [g, h, i]]) };
         Some(PoseAt { at: At::time(*t), pose, optics: None })
     });
     Ok(poses.collect())
@@ -138,7 +138,7 @@ fn depth(h5: &Hdf5, file: &Path, optics: Option<Optics>) -> Result<Option<Depth>
 }
 
 /// Hands of a tracker that knows depth; those of the image alone are no places.
-fn hands(h5: &Hdf5, times: &[Option<f64>], notes: &mut Vec<String>) -> Result<Option<Hands>> {
+fn hands(h5: &Hdf5, times: &[Option<f64>], notes: &mut Vec<String>) -> Result<Option<HandStream>> {
     if !h5.has("hand-pose/left_joints") {
         return Ok(None);
     }
@@ -162,11 +162,11 @@ fn hands(h5: &Hdf5, times: &[Option<f64>], notes: &mut Vec<String>) -> Result<Op
         }
     }
     let frame = JointFrame::Camera(CameraAxes::Opencv);
-    Ok(Some(Hands { frame, order: JointOrder::Mano, unit_m: 1.0, items }))
+    Ok(Some(HandStream { frame, order: JointOrder::Mano, unit_m: 1.0, items }))
 }
 
 /// What `calibrations/` tells.
-struct Calibration {
+struct SteraCalibration {
     color: Option<Optics>,
     depth: Option<Optics>,
     body_from_camera: Option<Pose>,
@@ -184,7 +184,7 @@ struct Size {
     height: usize,
 }
 
-impl Calibration {
+impl SteraCalibration {
     fn of(file: &Path) -> Result<Option<Self>> {
         let Some(meta) = beside(file, "calibrations/meta.json")? else { return Ok(None) };
         let meta: Meta = crate::json::read(&meta)?;

@@ -6,13 +6,13 @@
 use std::path::Path;
 
 use crate::error::{Error, Result};
-use crate::import::Options;
+use crate::import::ImportOptions;
 use crate::import::blob::{Blob, files, inside};
 use crate::import::capture::{
-    At, Capture, Depth, DepthAt, DepthCoding, ImageAt, Picture, PoseAt, Poses, RawPose, Turn, World,
+    At, Capture, Depth, DepthAt, DepthCoding, ImageAt, ImageSource, PoseAt, Poses, RawPose, RawRotation, SourceWorld,
 };
 use crate::import::optics::Optics;
-use crate::import::text::{Lines, Table, cells};
+use crate::import::text::{Lines, TableRow, TextTable, Unread, cells};
 use crate::math::Vector;
 
 /// LiDAR confidence is 0, 1 or 2; 0 is noise at edges and on dark surfaces.
@@ -22,35 +22,22 @@ pub(super) fn detect(path: &Path) -> bool {
     path.join("odometry.csv").is_file() && path.join("camera_matrix.csv").is_file()
 }
 
-pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, options: &ImportOptions) -> Result<Capture> {
     let video = inside(path, "rgb.mp4")?;
-    let [fx, fy, cx, cy] = camera_matrix(&path.join("camera_matrix.csv"))?;
-    // The file does not say its size. Principal points lie near the middle, and all of the device's images are 4 : 3.
-    let optics = match (options.camera, size_beside(path, cx, cy)) {
-        (Some(camera), _) => camera,
-        (None, Some([width, height])) => Optics::pinhole(width, height, [fx, fy, cx, cy]),
-        (None, None) => {
-            return Err(Error::format(
-                &path.join("camera_matrix.csv"),
-                "principal point",
-                format!("({cx}, {cy}) is the middle of no 4 : 3 image; give --camera WIDTH,HEIGHT,FX,FY,CX,CY"),
-            ));
-        }
-    };
+    let optics = camera(path, options)?;
     let mut poses = Vec::new();
     let mut images = Vec::new();
     let mut depth = Vec::new();
-    let mut table = Table::open(&path.join("odometry.csv"))?;
+    let mut table = TextTable::open(&path.join("odometry.csv"))?;
     table.need(&["timestamp", "frame", "x", "y", "z", "qx", "qy", "qz", "qw"])?;
     let mut lost = 0;
+    let mut unread = Unread::default();
     while let Some(row) = table.row()? {
-        let index = row.whole("frame")?;
-        let at = At::time(row.number("timestamp")?).with_index(index);
-        let position = row.numbers(["x", "y", "z"])?;
-        let turn = Turn::Quaternion(row.numbers(["qx", "qy", "qz", "qw"])?);
-        poses.push(PoseAt { at: at.clone(), pose: RawPose { position, turn }, optics: None });
+        let Some((index, posed)) = unread.keep(posed(&row)) else { continue };
+        let at = posed.at.clone();
+        poses.push(posed);
         if let Some(file) = &video {
-            let picture = Picture::Video { file: file.clone(), index, upright: false };
+            let picture = ImageSource::Video { file: file.clone(), index, upright: false };
             images.push(ImageAt { at: at.clone(), picture, optics: None });
         }
         let name = format!("{index:06}.png");
@@ -62,6 +49,7 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
             None => lost += 1,
         }
     }
+    let dropped = unread.told("poses", poses.len())?;
     if poses.is_empty() {
         return Err(Error::format(
             &path.join("odometry.csv"),
@@ -69,19 +57,14 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
             "there is none; was the recording stopped at once?",
         ));
     }
-    let mut notes = vec![format!("LiDAR depth of confidence {LEAST_CONFIDENCE} and more; the app records no hands")];
-    if video.is_some() {
-        notes.push("rows of odometry.csv are taken for the video's pictures one by one, from 0".to_owned());
-    }
-    if lost > 0 {
-        notes.push(format!("{lost} rows of odometry.csv have no depth image"));
-    }
+    let notes = notes(video.is_some(), lost);
     Ok(Capture {
         kind: "stray".to_owned(),
         source: path.to_owned(),
         title: "Stray Scanner recording".to_owned(),
         notes,
-        world: World { up: Some(Vector::y()), ..World::default() },
+        dropped: dropped.into_iter().collect(),
+        world: SourceWorld { up: Some(Vector::y()), ..SourceWorld::default() },
         optics: Some(optics),
         poses: Some(Poses { items: poses, ..Poses::default() }),
         images,
@@ -91,6 +74,43 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
         }),
         ..Capture::default()
     })
+}
+
+/// The camera: the user's, else the file's. The file does not say its size; principal points lie near the middle, and all of
+/// the device's images are 4 : 3.
+fn camera(path: &Path, options: &ImportOptions) -> Result<Optics> {
+    let file = path.join("camera_matrix.csv");
+    let [fx, fy, cx, cy] = camera_matrix(&file)?;
+    match (options.camera, size_beside(path, cx, cy)) {
+        (Some(camera), _) => Ok(camera),
+        (None, Some([width, height])) => Ok(Optics::pinhole(width, height, [fx, fy, cx, cy])),
+        (None, None) => Err(Error::format(
+            &file,
+            "principal point",
+            format!("({cx}, {cy}) is the middle of no 4 : 3 image; give --camera WIDTH,HEIGHT,FX,FY,CX,CY"),
+        )),
+    }
+}
+
+/// What a user should know; `lost` rows have no depth.
+fn notes(has_video: bool, lost: usize) -> Vec<String> {
+    let mut notes = vec![format!("LiDAR depth of confidence {LEAST_CONFIDENCE} and more; the app records no hands")];
+    if has_video {
+        notes.push("rows of odometry.csv are taken for the video's pictures one by one, from 0".to_owned());
+    }
+    if lost > 0 {
+        notes.push(format!("{lost} rows of odometry.csv have no depth image"));
+    }
+    notes
+}
+
+/// The frame of a row of the odometry, and its pose.
+fn posed(row: &TableRow<'_>) -> Result<(usize, PoseAt)> {
+    let index = row.whole("frame")?;
+    let at = At::time(row.number("timestamp")?).with_index(index);
+    let position = row.numbers(["x", "y", "z"])?;
+    let turn = RawRotation::Quaternion(row.numbers(["qx", "qy", "qz", "qw"])?);
+    Ok((index, PoseAt { at, pose: RawPose { position, turn }, optics: None }))
 }
 
 /// fx, fy, cx, cy of three rows of three numbers.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::error::{Error, Result};
-use crate::import::Options;
+use crate::import::ImportOptions;
 use crate::import::capture::{At, Capture, ClipAt};
 use crate::import::names::{ending, seconds};
 use crate::import::text::Lines;
@@ -12,7 +12,7 @@ pub(super) fn detect(path: &Path) -> bool {
     path.is_file() && ["srt", "vtt"].contains(&ending(path).as_str())
 }
 
-pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, _options: &ImportOptions) -> Result<Capture> {
     let mut lines = Lines::open(path)?;
     let mut clips = Vec::new();
     while let Some(line) = lines.line()? {
@@ -83,12 +83,12 @@ mod tests {
         let text = "1\r\n00:00:01,500 --> 00:00:03,000\r\n<i>open</i>\r\nthe door\r\n\r\n\
                     2\r\n00:00:04,000 --> 00:00:05,000\r\n\r\n";
         std::fs::write(&path, text).unwrap();
-        let capture = read(&path, &Options::default()).unwrap();
+        let capture = read(&path, &ImportOptions::default()).unwrap();
         let [clip] = capture.clips.as_slice() else { panic!("{:?}", capture.clips) };
         assert_eq!((clip.start.time_secs, clip.end.time_secs), (Some(1.5), Some(3.0)));
         assert_eq!(clip.narration, "open the door");
         std::fs::write(&path, "WEBVTT\n\n00:01.000 --> 00:02.000 align:start\nclose it\n").unwrap();
-        assert_eq!(read(&path, &Options::default()).unwrap().clips[0].end.time_secs, Some(2.0));
+        assert_eq!(read(&path, &ImportOptions::default()).unwrap().clips[0].end.time_secs, Some(2.0));
     }
 
     #[test]
@@ -97,7 +97,7 @@ mod tests {
         let path = dir.path().join("a.srt");
         for (text, word) in [("1\nsoon --> later\nx\n", "line 2"), ("", "there is none")] {
             std::fs::write(&path, text).unwrap();
-            let error = read(&path, &Options::default()).unwrap_err().to_string();
+            let error = read(&path, &ImportOptions::default()).unwrap_err().to_string();
             assert!(error.contains(word) && error.contains("a.srt"), "{error}");
         }
     }

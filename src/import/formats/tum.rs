@@ -6,13 +6,13 @@
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::import::Options;
+use crate::import::ImportOptions;
 use crate::import::blob::{Blob, inside};
 use crate::import::capture::{
-    At, Capture, Depth, DepthAt, DepthCoding, ImageAt, Picture, PoseAt, Poses, RawPose, Turn, World,
+    At, Capture, Depth, DepthAt, DepthCoding, ImageAt, ImageSource, PoseAt, Poses, RawPose, RawRotation, SourceWorld,
 };
 use crate::import::optics::Optics;
-use crate::import::text::{Lines, cells};
+use crate::import::text::{Lines, Unread, cells};
 
 /// Depth counts a metre.
 const DEPTH_PER_M: f64 = 5000.0;
@@ -35,26 +35,26 @@ fn is_trajectory(path: &Path) -> bool {
     })
 }
 
-pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, _options: &ImportOptions) -> Result<Capture> {
     let mut capture = Capture {
         kind: "tum".to_owned(),
         source: path.to_owned(),
         title: "TUM trajectory".to_owned(),
-        world: World::default(),
+        world: SourceWorld::default(),
         ..Capture::default()
     };
     if !path.is_dir() {
-        capture.poses = Some(trajectory(path)?);
+        capture.poses = Some(trajectory(path, &mut capture.dropped)?);
         return Ok(capture);
     }
     capture.title = "TUM RGB-D sequence".to_owned();
     let truth = path.join("groundtruth.txt");
     if truth.is_file() {
-        capture.poses = Some(trajectory(&truth)?);
+        capture.poses = Some(trajectory(&truth, &mut capture.dropped)?);
     }
     capture.images = list(path, "rgb.txt")?
         .into_iter()
-        .map(|(at, file)| ImageAt { at, picture: Picture::Still(Blob::File(file)), optics: None })
+        .map(|(at, file)| ImageAt { at, picture: ImageSource::Still(Blob::File(file)), optics: None })
         .collect();
     if path.join("depth.txt").is_file() {
         let items: Vec<DepthAt> = list(path, "depth.txt")?
@@ -71,26 +71,33 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
 }
 
 /// `t x y z qx qy qz qw` a line.
-fn trajectory(path: &Path) -> Result<Poses> {
+fn trajectory(path: &Path, dropped: &mut Vec<String>) -> Result<Poses> {
     let mut lines = Lines::open(path)?;
     let mut items = Vec::new();
+    let mut unread = Unread::default();
     while let Some(line) = lines.content()? {
-        let cells = cells(&line);
-        if cells.len() != 8 {
-            return Err(lines.fault(format!("{} numbers, expected timestamp x y z qx qy qz qw", cells.len())));
-        }
-        let mut v = [0.0; 8];
-        for (value, cell) in v.iter_mut().zip(&cells) {
-            *value = lines.number("trajectory", cell)?;
-        }
-        let [t, x, y, z, a, b, c, d] = v;
-        let pose = RawPose { position: [x, y, z], turn: Turn::Quaternion([a, b, c, d]) };
-        items.push(PoseAt { at: At::time(t), pose, optics: None });
+        items.extend(unread.keep(posed(&lines, &line)));
     }
+    dropped.extend(unread.told("poses", items.len())?);
     if items.is_empty() {
         return Err(Error::format(path, "end of file", "no poses; expected lines of timestamp x y z qx qy qz qw"));
     }
     Ok(Poses { items, ..Poses::default() })
+}
+
+/// The pose of a line.
+fn posed(lines: &Lines, line: &str) -> Result<PoseAt> {
+    let cells = cells(line);
+    if cells.len() != 8 {
+        return Err(lines.fault(format!("{} numbers, expected timestamp x y z qx qy qz qw", cells.len())));
+    }
+    let mut v = [0.0; 8];
+    for (value, cell) in v.iter_mut().zip(&cells) {
+        *value = lines.number("trajectory", cell)?;
+    }
+    let [t, x, y, z, a, b, c, d] = v;
+    let pose = RawPose { position: [x, y, z], turn: RawRotation::Quaternion([a, b, c, d]) };
+    Ok(PoseAt { at: At::time(t), pose, optics: None })
 }
 
 /// `timestamp file` a line. Files that are not there are left out.
@@ -134,7 +141,7 @@ fn calibration(root: &Path, capture: &Capture) -> Result<Option<Optics>> {
         *value = lines.number("calibration", cell)?;
     }
     let size = capture.images.iter().find_map(|i| match &i.picture {
-        Picture::Still(Blob::File(file)) => image::image_dimensions(file).ok(),
+        ImageSource::Still(Blob::File(file)) => image::image_dimensions(file).ok(),
         _ => None,
     });
     let Some((width, height)) = size else { return Ok(None) };

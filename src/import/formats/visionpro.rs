@@ -11,12 +11,13 @@ use serde_json::Value;
 use crate::error::{Error, Result};
 use crate::import::blob::inside;
 use crate::import::capture::{
-    At, CameraAxes, Capture, HandAt, Hands, ImageAt, JointFrame, Missing, Picture, PoseAt, Poses, RawPose, World,
+    At, CameraAxes, Capture, HandAt, HandStream, ImageAt, ImageSource, JointFrame, Missing, PoseAt, Poses, RawPose,
+    SourceWorld,
 };
-use crate::import::joints::JointOrder;
-use crate::import::optics::{Lens, Optics};
-use crate::import::text::Lines;
-use crate::import::{Options, video};
+use crate::import::joint_orders::JointOrder;
+use crate::import::optics::{LensModel, Optics};
+use crate::import::text::{Lines, Unread};
+use crate::import::{ImportOptions, video};
 use crate::math::{Pose, Vector};
 use crate::recording::Side;
 
@@ -63,9 +64,11 @@ struct Tracked {
     width: usize,
     /// Hands that were left out.
     stale: usize,
+    /// What of the lines cannot be read, in words.
+    dropped: Option<String>,
 }
 
-pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, options: &ImportOptions) -> Result<Capture> {
     let tracked = tracking(&path.join("tracking.jsonl"))?;
     let file = path.join("metadata.json");
     let metadata: Value = crate::json::read(&file)?;
@@ -95,7 +98,7 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
     }
     missing.push(Missing {
         what: "depth".to_owned(),
-        why: "the headset gives no depth to apps".to_owned(),
+        why: "the headset gives no depth to apps: joints come from the hands, fronts and boxes are assumed".to_owned(),
         command: "run a metric depth network (MoGe-2) on the video's pictures and import its folder too".to_owned(),
     });
     Ok(Capture {
@@ -103,8 +106,9 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
         source: path.to_owned(),
         title: "Vision Pro recording (Tracking Streamer)".to_owned(),
         notes,
+        dropped: tracked.dropped.into_iter().collect(),
         clock: Some("unix".to_owned()),
-        world: World { up: Some(Vector::y()), ..World::default() },
+        world: SourceWorld { up: Some(Vector::y()), ..SourceWorld::default() },
         optics,
         poses: Some(Poses {
             axes: CameraAxes::Opengl,
@@ -113,7 +117,7 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Capture> {
             ..Poses::default()
         }),
         images,
-        hands: (!tracked.hands.is_empty()).then_some(Hands {
+        hands: (!tracked.hands.is_empty()).then_some(HandStream {
             frame: JointFrame::World,
             order: JointOrder::Arkit,
             unit_m: 1.0,
@@ -134,6 +138,7 @@ fn tracking(path: &Path) -> Result<Tracked> {
     let mut lines = Lines::open(path)?;
     let mut out = Tracked::default();
     let mut last: [Option<Value>; 2] = [None, None];
+    let mut unread = Unread::default();
     while let Some(line) = lines.content()? {
         let mut json: Value = serde_json::from_str(&line).map_err(|e| {
             lines.fault(format!("is no JSON ({e}); a file that ends early is a copy that was not finished"))
@@ -148,18 +153,18 @@ fn tracking(path: &Path) -> Result<Tracked> {
         out.times.push(time);
         let at = At::time(time).with_index(index);
         if !json["headMatrix"].is_null() {
-            let Some(head) = matrix(&json["headMatrix"]) else {
-                return Err(lines.fault("headMatrix: expected 16 numbers"));
-            };
-            let rows: Vec<f64> = head.transpose().iter().copied().collect();
-            out.poses.extend(RawPose::from_rows(&rows).map(|pose| PoseAt { at: at.clone(), pose, optics: None }));
+            let head = matrix(&json["headMatrix"]).ok_or_else(|| lines.fault("headMatrix: expected 16 numbers"));
+            let rows = unread.keep(head).map(|head| head.transpose().iter().copied().collect::<Vec<f64>>());
+            let pose = rows.and_then(|rows| RawPose::from_rows(&rows));
+            out.poses.extend(pose.map(|pose| PoseAt { at: at.clone(), pose, optics: None }));
         }
         for ((side, key), last) in [(Side::Left, "leftHand"), (Side::Right, "rightHand")].into_iter().zip(&mut last) {
             let hand = json[key].take();
             if hand.is_null() {
                 continue;
             }
-            let joints = joints(&hand).map_err(|e| lines.fault(format!("{key}.{e}")))?;
+            let joints = unread.keep(joints(&hand).map_err(|e| lines.fault(format!("{key}.{e}"))));
+            let Some(joints) = joints else { continue };
             let is_tracked = joints.is_some() && last.as_ref() != Some(&hand);
             *last = Some(hand);
             match joints {
@@ -170,6 +175,7 @@ fn tracking(path: &Path) -> Result<Tracked> {
             }
         }
     }
+    out.dropped = unread.told("matrices or hands", out.poses.len() + out.hands.len())?;
     if out.poses.is_empty() {
         return Err(Error::format(
             path,
@@ -217,9 +223,9 @@ fn intrinsics(json: &Value, file: &Path) -> Result<Optics> {
     let d: Vec<f64> = left["distortionCoeffs"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect();
     let at = |i: usize| d.get(i).copied().unwrap_or(0.0);
     // OpenCV's order: k1, k2, p1, p2, k3 to k6.
-    let lens = Lens::OpenCv { k: [at(0), at(1), at(4), at(5), at(6), at(7)], p: [at(2), at(3)] };
+    let lens = LensModel::OpenCv { k: [at(0), at(1), at(4), at(5), at(6), at(7)], p: [at(2), at(3)] };
     let (width, height) = (number("imageWidth")?.max(0.0) as usize, number("imageHeight")?.max(0.0) as usize);
-    let lens = if d.iter().all(|c| *c == 0.0) { Lens::Pinhole } else { lens };
+    let lens = if d.iter().all(|c| *c == 0.0) { LensModel::Pinhole } else { lens };
     let optics =
         Optics { width, height, fx: number("fx")?, fy: number("fy")?, cx: number("cx")?, cy: number("cy")?, lens };
     match optics.fault() {
@@ -248,7 +254,7 @@ fn mounted(json: &Value, file: &Path) -> Result<Pose> {
 }
 
 /// The video's pictures: one a line where they are as many, else by the file's own times.
-fn pictures(film: &Path, times: &[f64], options: &Options, notes: &mut Vec<String>) -> Vec<ImageAt> {
+fn pictures(film: &Path, times: &[f64], options: &ImportOptions, notes: &mut Vec<String>) -> Vec<ImageAt> {
     let own = video::times(options.ffmpeg.as_deref(), film).unwrap_or_default();
     let first = times.first().copied().unwrap_or(0.0);
     let times: Vec<f64> = if own.is_empty() || own.len() == times.len() {
@@ -259,7 +265,7 @@ fn pictures(film: &Path, times: &[f64], options: &Options, notes: &mut Vec<Strin
     };
     let image = |(index, time): (usize, &f64)| ImageAt {
         at: At::time(*time).with_index(index),
-        picture: Picture::Video { file: film.to_owned(), index, upright: true },
+        picture: ImageSource::Video { file: film.to_owned(), index, upright: true },
         optics: None,
     };
     times.iter().enumerate().map(image).collect()

@@ -7,10 +7,10 @@
 use std::path::Path;
 
 use crate::error::{Error, Result};
-use crate::import::Options;
+use crate::import::ImportOptions;
 use crate::import::blob::files;
-use crate::import::capture::{At, CameraAxes, Capture, HandAt, Hands, JointFrame};
-use crate::import::joints::JointOrder;
+use crate::import::capture::{At, CameraAxes, Capture, HandAt, HandStream, JointFrame};
+use crate::import::joint_orders::JointOrder;
 use crate::import::names::{numbered, stem};
 use crate::import::text::Lines;
 use crate::recording::Side;
@@ -39,7 +39,7 @@ pub(super) fn detect(path: &Path) -> bool {
         })
 }
 
-pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
+pub(super) fn read(path: &Path, _options: &ImportOptions) -> Result<Capture> {
     let (mut items, mut notes) = (Vec::new(), Vec::new());
     let mut first_fault = None;
     let mut faults = 0;
@@ -82,7 +82,7 @@ pub(super) fn read(path: &Path, _options: &Options) -> Result<Capture> {
         title: "WiLoR meshes".to_owned(),
         licence: Some("CC BY-NC-ND 4.0 (WiLoR), MANO's licence".to_owned()),
         notes,
-        hands: Some(Hands {
+        hands: Some(HandStream {
             frame: JointFrame::Camera(CameraAxes::Opengl),
             order: JointOrder::Mano,
             unit_m: 1.0,

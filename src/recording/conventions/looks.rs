@@ -1,5 +1,7 @@
 //! Depth of a few frames, thinned: all that is decoded for the checks of poses.
 
+use std::sync::Arc;
+
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 
@@ -25,7 +27,7 @@ pub(super) struct Look {
     /// Normals of surfaces that it sees, its camera's frame.
     pub normals: Vec<Vector>,
     camera: Camera,
-    sketch: Sketch,
+    sketch: Arc<Sketch>,
 }
 
 /// Evenly spread looks, in the order of frames.
@@ -59,10 +61,23 @@ fn look(frame: usize, depth: &Grid<f32>, full: &Camera) -> Look {
     // Wide enough to average pixel noise, narrow enough for a drawer's front.
     let reach = (width / 40).max(2);
     let normals = grid((stride / 2).max(1)).filter_map(|(x, y)| sketch.normal(full, x, y, reach)).collect();
-    Look { frame, places, normals, camera: sketch.camera(full), sketch }
+    Look { frame, places, normals, camera: sketch.camera(full), sketch: Arc::new(sketch) }
 }
 
 impl Look {
+    /// The same places where they are through another camera of the full image's size, without their normals.
+    pub fn through(&self, full: &Camera) -> Self {
+        let camera = self.sketch.camera(full);
+        let moved = |p: &Point| self.camera.project(p).map(|(u, v)| camera.unproject(u, v, p.z));
+        Self {
+            frame: self.frame,
+            places: self.places.iter().filter_map(moved).collect(),
+            normals: Vec::new(),
+            camera,
+            sketch: Arc::clone(&self.sketch),
+        }
+    }
+
     /// The share of another look's places, moved by `turn * p + shift` into this one, that are where this one sees something.
     /// One factor of all depth is free: estimated depth has one of its own in each frame.
     pub fn meets(&self, places: &[Point], turn: &Matrix3<f64>, shift: &Vector) -> f64 {

@@ -1,7 +1,7 @@
 //! Whether a recording means what it says: camera poses, up, hands and clocks against each other.
 //!
 //! One idea carries the poses: depth of one frame, moved into another one by the poses, has to meet that frame's depth. The
-//! right reading of the numbers (direction, axes, order of a quaternion, unit, clock) is the one under which it does; how much
+//! right reading of the numbers (direction, axes, order of a quaternion, unit, clock, intrinsics) is the one under which it does; how much
 //! more often it does than under the declared reading is the evidence. It needs no images, and depth that is off by a factor
 //! in each frame does no harm. Up is told by heads, which hardly roll, and by level surfaces, which are seen from above; hands by
 //! where they project to and what is seen there: a hand's own pixels, or depth, in which a hand hides what is behind it where
@@ -11,6 +11,7 @@ mod agreement;
 mod gravity;
 mod hands;
 mod hiding;
+mod lens;
 mod looks;
 mod poses;
 mod reading;
@@ -145,8 +146,10 @@ pub fn findings(subject: &Subject) -> Vec<Finding> {
     let looks = looks::looks(subject);
     let judged = poses::judge(subject, &looks);
     let mut out = judged.findings;
-    // What the wrong poses do to up and hands is no finding of its own.
-    out.extend(gravity::judge(&judged.poses, &looks));
+    // What the wrong poses or a wrong lens do to up and hands is no finding of its own.
+    if !judged.is_lens {
+        out.extend(gravity::judge(&judged.poses, &looks));
+    }
     if !judged.is_turned {
         out.extend(hands::judge(subject, &looks));
     }

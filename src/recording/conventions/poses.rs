@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::agreement::{Candidate, Pair, mean, nats, pairs};
 use super::looks::Look;
 use super::reading::{axes, axes_words, is_opengl, with_axes};
-use super::{Finding, Fix, LIKELY_NATS, Reading, Subject};
+use super::{Finding, Fix, LIKELY_NATS, Reading, Subject, lens};
 use crate::math::{Pose, stats};
 
 /// What positions could have to be multiplied by: units (millimetres, centimetres, inches, feet), and a ladder between.
@@ -39,8 +39,11 @@ pub(super) struct Judged {
     pub findings: Vec<Finding>,
     /// The poses as they are most likely meant, +Z where it is declared.
     pub poses: Vec<Pose>,
-    /// Whether they differ from the declared ones, so that what is in their world may not fit them any more.
+    /// Whether they differ from the declared ones, or are not seen rightly, so that what is in their world may not fit them any
+    /// more.
     pub is_turned: bool,
+    /// Whether the camera's intrinsics are others, so that no direction in the images is right.
+    pub is_lens: bool,
 }
 
 /// One reading with how well it explains depth.
@@ -70,7 +73,7 @@ impl Board<'_> {
 
 /// Compares all readings.
 pub(super) fn judge(subject: &Subject, looks: &[Look]) -> Judged {
-    let as_is = Judged { findings: Vec::new(), poses: subject.poses.clone(), is_turned: false };
+    let as_is = Judged { findings: Vec::new(), poses: subject.poses.clone(), is_turned: false, is_lens: false };
     let board = Board { looks, pairs: pairs(subject, looks) };
     if looks.len() < LEAST || board.pairs.len() < LEAST {
         return as_is;
@@ -82,6 +85,10 @@ pub(super) fn judge(subject: &Subject, looks: &[Look]) -> Judged {
     let best = turned(&board, subject, &declared, at_rest, others);
     let best = scaled(&board, best);
     let best = late(&board, best);
+    // A wrong lens may look like wrong positions, and is told where it explains more than any of them.
+    if let Some(finding) = lens::judge(subject, looks, &board.pairs, &declared.shares, &best.shares) {
+        return Judged { findings: vec![finding], is_turned: true, is_lens: true, ..as_is };
+    }
     let mut findings = Vec::new();
     findings.extend(told_turn(&board, &declared, &best));
     findings.extend(told_scale(&board, subject, &best));
@@ -93,7 +100,7 @@ pub(super) fn judge(subject: &Subject, looks: &[Look]) -> Judged {
     let c = best.candidate;
     let poses = c.poses.iter().map(|p| with_axes(p, &c.axes)).collect();
     let is_turned = best.reading != Reading::Declared || c.axes != Matrix3::identity() || c.scale != 1.0 || c.lag != 0;
-    Judged { findings, poses, is_turned }
+    Judged { findings, poses, is_turned, is_lens: false }
 }
 
 /// All readings with all axes at one scale; the declared one is the first.

@@ -65,10 +65,10 @@ class Network:
 
 
 def load(device="cpu", weights=None):
-    """The detector. `weights`: a folder with the two models, else those of the package."""
+    """The detector. `weights`: a folder that may hold the two models, else those of the package."""
     mediapipe = package("mediapipe", ABOUT)
     tasks = package("mediapipe.tasks.python", ABOUT)
-    folders = [weights] if weights else [pathlib.Path(mediapipe.__file__).parent]
+    folders = [*([weights] if weights else []), pathlib.Path(mediapipe.__file__).parent]
     bundle = io.BytesIO()
     with zipfile.ZipFile(bundle, "w", zipfile.ZIP_STORED) as packed:
         for name, data in weights_of(ABOUT, folders).items():

@@ -10,6 +10,9 @@ from . import About, package
 OVERLAP = 12
 # Models of fewer images are no walk through a kitchen.
 LEAST_IMAGES = 10
+OPTIONS = {"overlap": OVERLAP}
+# The reader of `paws import` for what it writes.
+FORMAT = "colmap"
 
 ABOUT = About(
     name="pycolmap",
@@ -55,7 +58,7 @@ class Network:
         if not models:
             raise Failure(
                 f"{images}: no poses can be found: neighbouring images have too little in common (motion blur, bare walls, a camera "
-                "that only turns); give poses of another source, or film more slowly"
+                "that only turns); give poses of another source (a phone with ARKit), or film more slowly and with more light"
             )
         counts = []
         for number, model in enumerate(models):

@@ -1,4 +1,4 @@
-"""Depth by a metric model of `transformers`: Depth Anything's metric ones, Depth Pro.
+"""Depth by a metric model of `transformers`: Depth Anything's metric ones, Prompt Depth Anything, Depth Pro.
 
 The model is a folder as its authors publish it (`config.json`, `model.safetensors`, `preprocessor_config.json`); nothing is fetched.
 """
@@ -7,16 +7,15 @@ import json
 import pathlib
 
 from .. import Failure
-from ..cache import digest_of
-from . import About, package
+from . import About, files_of, from_folder, licence_of, loaded, offline, package, torch_on, within_memory
 
 ABOUT = About(
     name="transformers-depth",
     stream="depth",
     package="transformers>=4.57",
     extra="depth",
-    licence="the model's own (Depth Anything V2 Metric Small: Apache-2.0)",
-    needs="colour images; a model's folder",
+    licence="the model's own (Depth Anything V2 Metric Small, Prompt Depth Anything: Apache-2.0; Depth Pro: Apple's, for research)",
+    needs="colour images; a model's folder; Prompt Depth Anything: the depth of the phone's LiDAR, too",
     gives="metres along the camera's axis (x right, y down, z forward), a value a pixel of the image",
     devices=("gpu", "cpu"),
     # Of a base model on one core; a GPU takes a twentieth.
@@ -25,8 +24,15 @@ ABOUT = About(
     version=1,
     weights_from="a folder named by --depth-model, as its authors publish it",
 )
+# The kind of model that refines a sensor's depth.
+PROMPTED = "prompt_depth_anything"
 # Kinds of models that give metres without being told so.
-METRIC = ("depth_pro",)
+METRIC = ("depth_pro", PROMPTED)
+
+
+def fits(folder):
+    """Whether a folder holds such a model."""
+    return (pathlib.Path(folder) / "config.json").is_file()
 
 
 def about_model(folder):
@@ -36,14 +42,18 @@ def about_model(folder):
     try:
         config = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise Failure(f"{path}: {error}: --depth-model wants a folder with config.json and model.safetensors") from error
-    kind = config.get("model_type", "")
+        raise Failure(
+            f"{path}: {error}: --depth-model wants a folder with config.json and model.safetensors, or with MoGe's model.pt"
+        ) from error
+    kind = config.get("model_type", "") if isinstance(config, dict) else ""
     if kind not in METRIC and config.get("depth_estimation_type") != "metric":
         raise Failure(f"{path}: a \"{kind}\" model whose depth has no unit; take a metric one (Depth-Anything-V2-Metric-Indoor, Depth Pro)")
-    files = sorted(p for p in folder.iterdir() if p.suffix in (".safetensors", ".json") and p.is_file())
-    if not any(p.suffix == ".safetensors" for p in files):
-        raise Failure(f"{folder}: has no .safetensors file: download the model's weights into it")
-    return kind, {p.name: digest_of(p) for p in files}
+    return kind, files_of(folder, (".safetensors", ".json"), ".safetensors", "--depth-model")
+
+
+def licence(folder):
+    """The licence of a model, as its card says it."""
+    return licence_of(folder, ABOUT.licence)
 
 
 class Network:
@@ -52,34 +62,27 @@ class Network:
     def __init__(self, torch, model, processor, device):
         self._torch, self._model, self._processor, self._device = torch, model, processor, device
 
-    def run(self, image):
-        """Metres along the axis for each pixel of an RGB image."""
-        inputs = self._processor(images=image, return_tensors="pt").to(self._device)
-        try:
+    def run(self, images, prompts=None, fov_deg=None):
+        """For each RGB image metres along the axis for each pixel, and no normals.
+
+        `prompts`: for each image a sensor's depth, millimetres, of any size and without holes, for models that refine one.
+        `fov_deg`: passed over, as these models find it themselves or have learnt it.
+        """
+        given = {"prompt_depth": prompts} if prompts else {}
+        with within_memory(self._torch):
+            inputs = self._processor(images=images, return_tensors="pt", **given).to(self._device)
             with self._torch.no_grad():
                 out = self._model(**inputs)
-        except self._torch.OutOfMemoryError as error:
-            raise Failure(
-                "depth: the GPU's memory is too small for this model: take a smaller one, or leave out --gpu; what is finished stays in "
-                "the cache"
-            ) from error
-        scaled = self._processor.post_process_depth_estimation(out, target_sizes=[image.shape[:2]])
-        return scaled[0]["predicted_depth"].float().cpu().numpy()
+            sizes = [image.shape[:2] for image in images]
+            scaled = self._processor.post_process_depth_estimation(out, target_sizes=sizes)
+            return [(one["predicted_depth"].float().cpu().numpy(), None) for one in scaled]
 
 
 def load(device="cpu", weights=None):
     """The model of a folder."""
-    torch, transformers = package("torch", ABOUT), package("transformers", ABOUT)
-    if device == "gpu" and not torch.cuda.is_available():
-        raise Failure("depth: no GPU that PyTorch can use is here: leave out --gpu (slow), or install PyTorch for your GPU")
-    on = "cuda" if device == "gpu" else "cpu"
-    try:
-        model, told = transformers.AutoModelForDepthEstimation.from_pretrained(weights, local_files_only=True, output_loading_info=True)
-        processor = transformers.AutoImageProcessor.from_pretrained(weights, local_files_only=True)
-    except Exception as error:  # Each of the libraries below has an error of its own.
-        raise Failure(f"{weights}: cannot be loaded ({(str(error).splitlines() or [repr(error)])[0]}): download the model again") from error
-    # What a file lacks would be random numbers.
-    if told["missing_keys"]:
-        raise Failure(f"{weights}: {len(told['missing_keys'])} of the model's weights are not in its file: it is of another version")
-    model = model.to(on).eval()
-    return Network(torch, model, processor, on)
+    offline()
+    torch, on = torch_on(device, ABOUT)
+    transformers = package("transformers", ABOUT)
+    model = loaded(transformers.AutoModelForDepthEstimation, weights)
+    processor = from_folder(transformers.AutoImageProcessor, weights)
+    return Network(torch, model.to(on).eval(), processor, on)

@@ -2,17 +2,17 @@
 
 use std::path::Path;
 
-use super::{Bag, Content, Seen};
+use super::bag::{Bag, ImageContent, TopicImage};
 use crate::error::{Error, Result};
-use crate::import::Options;
-use crate::import::capture::{Picture, PixelCoding};
+use crate::import::ImportOptions;
+use crate::import::capture::{ImageSource, PixelCoding};
 use crate::import::ros::CameraInfo;
 
 /// Topics by which the Stera app's recordings are known.
 const STERA: [&str; 2] = ["/camera/rgb/compressed", "/camera/pose"];
 
 /// The topics that were told or guessed.
-pub(super) struct Choice<'a> {
+pub(super) struct TopicChoice<'a> {
     /// Of colour images.
     pub color: Option<&'a str>,
     /// Of depth.
@@ -21,24 +21,26 @@ pub(super) struct Choice<'a> {
     pub is_stera: bool,
 }
 
-fn is_color(seen: &Seen) -> bool {
-    matches!(seen.content, Content::Color(_))
+fn is_color(seen: &TopicImage) -> bool {
+    matches!(seen.content, ImageContent::Color(_))
 }
 
-fn is_depth(seen: &Seen) -> bool {
-    matches!(seen.content, Content::Depth(..))
+fn is_depth(seen: &TopicImage) -> bool {
+    matches!(seen.content, ImageContent::Depth(..))
 }
 
 /// Chooses topics.
 ///
 /// # Errors
 /// Where a topic that the user told does not hold what it should.
-pub(super) fn choose<'a>(path: &Path, bag: &'a Bag, options: &Options) -> Result<Choice<'a>> {
+pub(super) fn choose<'a>(path: &Path, bag: &'a Bag, options: &ImportOptions) -> Result<TopicChoice<'a>> {
     let [image, pose] = STERA;
     let is_stera = bag.images.contains_key(image) && bag.poses.contains_key(pose);
     let color = topic(path, bag, options, "color", is_color, |name, seen| {
         let has = |words: &[&str]| words.iter().any(|w| name.contains(w));
-        let grey = |s: &Seen| matches!(s.content, Content::Color(Picture::Raw { coding: PixelCoding::Grey, .. }));
+        let grey = |s: &TopicImage| {
+            matches!(s.content, ImageContent::Color(ImageSource::Raw { coding: PixelCoding::Grey, .. }))
+        };
         let is_named = has(&["rgb", "color", "colour"]) && !has(&["depth"]);
         (is_named, !seen.iter().any(grey), camera(bag, name).is_some(), seen.len())
     })?;
@@ -47,19 +49,19 @@ pub(super) fn choose<'a>(path: &Path, bag: &'a Bag, options: &Options) -> Result
         let is_aligned = name.contains("aligned") || name.contains("registered");
         (frame(bag, name) == seen_by, is_aligned, camera(bag, name).is_some(), seen.len())
     })?;
-    Ok(Choice { color, depth, is_stera })
+    Ok(TopicChoice { color, depth, is_stera })
 }
 
 /// The topic that the user told, else the one of the highest rank among those that hold what is wanted.
 fn topic<'a, R: Ord>(
     path: &Path,
     bag: &'a Bag,
-    options: &Options,
+    options: &ImportOptions,
     what: &str,
-    fits: fn(&Seen) -> bool,
-    rank: impl Fn(&str, &[Seen]) -> R,
+    fits: fn(&TopicImage) -> bool,
+    rank: impl Fn(&str, &[TopicImage]) -> R,
 ) -> Result<Option<&'a str>> {
-    let fitting: Vec<(&'a String, &'a Vec<Seen>)> =
+    let fitting: Vec<(&'a String, &'a Vec<TopicImage>)> =
         bag.images.iter().filter(|(_, seen)| seen.iter().any(fits)).collect();
     let Some(told) = options.topics.get(what) else {
         return Ok(fitting.iter().max_by_key(|(name, seen)| rank(name, seen)).map(|(name, _)| name.as_str()));
@@ -70,7 +72,7 @@ fn topic<'a, R: Ord>(
     let names: Vec<&str> = fitting.iter().map(|(name, _)| name.as_str()).collect();
     let found = if names.is_empty() { "no topic does".to_owned() } else { format!("these do: {}", names.join(", ")) };
     let why = bag.images.get(told).into_iter().flatten().find_map(|s| match &s.content {
-        Content::Unread(why) => Some(format!(" but {why}")),
+        ImageContent::Unread(why) => Some(format!(" but {why}")),
         _ => None,
     });
     let message = format!("holds no images of {what} that are read{}; {found}", why.unwrap_or_default());

@@ -4,11 +4,11 @@ use std::path::Path;
 
 use nalgebra::{Quaternion, UnitQuaternion};
 
-use super::Bag;
+use super::bag::Bag;
 use crate::error::{Error, Result};
-use crate::import::Options;
-use crate::import::capture::{At, PoseAt, Poses, RawPose, World};
-use crate::import::ros::{self, Posed};
+use crate::import::ImportOptions;
+use crate::import::capture::{At, PoseAt, Poses, RawPose, SourceWorld};
+use crate::import::ros::{self, RosPose};
 use crate::math::{Pose, Vector};
 
 /// World frames whose z axis is up by ROS' rule.
@@ -17,11 +17,11 @@ const UPRIGHT: [&str; 4] = ["map", "odom", "world", "earth"];
 const STERA_BODY: &str = "camera_link";
 
 /// Poses, and the world that they are in.
-pub(super) struct Tracked {
+pub(super) struct TrackedCamera {
     /// The poses.
     pub poses: Poses,
     /// Their world.
-    pub world: World,
+    pub world: SourceWorld,
 }
 
 /// The camera's poses; `camera` is its frame. `None` where nothing tells them.
@@ -33,9 +33,9 @@ pub(super) fn poses(
     bag: &Bag,
     camera: &str,
     is_stera: bool,
-    options: &Options,
+    options: &ImportOptions,
     notes: &mut Vec<String>,
-) -> Result<Option<Tracked>> {
+) -> Result<Option<TrackedCamera>> {
     let told = options.topics.get("poses").map(String::as_str);
     let topic = match told {
         Some("tf") => None,
@@ -63,12 +63,12 @@ pub(super) fn poses(
             name if UPRIGHT.contains(&name) => Some(Vector::z()),
             _ => None,
         };
-        Tracked { poses, world: World { up, ..World::default() } }
+        TrackedCamera { poses, world: SourceWorld { up, ..SourceWorld::default() } }
     }))
 }
 
 /// The body's frame that a pose is of.
-fn body<'a>(bag: &'a Bag, posed: &'a Posed, camera: &str, is_stera: bool) -> Option<&'a str> {
+fn body<'a>(bag: &'a Bag, posed: &'a RosPose, camera: &str, is_stera: bool) -> Option<&'a str> {
     match &posed.body {
         Some(body) => Some(body.as_str()),
         None if is_stera => Some(STERA_BODY),
@@ -81,7 +81,7 @@ fn body<'a>(bag: &'a Bag, posed: &'a Posed, camera: &str, is_stera: bool) -> Opt
 fn of_topic(
     bag: &Bag,
     topic: &str,
-    items: &[Posed],
+    items: &[RosPose],
     camera: &str,
     is_stera: bool,
     notes: &mut Vec<String>,
