@@ -2,23 +2,22 @@
 
 use std::collections::BTreeMap;
 
-use super::{ClipResult, weigh};
+use super::{ClipResult, method, weigh};
 use crate::articulation::Outcome;
-use crate::config::{Config, InferenceMethod, LineMethod};
+use crate::config::{Config, LineMethod};
 use crate::error::Result;
 use crate::geometry::Rect;
 use crate::geometry::segments::LiftedSegment;
 use crate::geometry::{Face, LineTrack, ManhattanFrame, candidates, face, tracks};
 use crate::hands::contact::Hold;
 use crate::hands::{self, Trajectory};
-use crate::inference;
 use crate::localization::{self, Footage, Region, views};
 use crate::math::{Point, Vector, signed_angle};
 use crate::part::outline;
 use crate::part::outline::Stop;
-use crate::part::views as open_state;
+use crate::part::views::{self as open_state, View};
 use crate::reasoning::words::{Sight, Words};
-use crate::reasoning::{self, PartShape, Reasoner};
+use crate::reasoning::{self, Answer, PartShape, Reasoner};
 use crate::recording::narration::{self, Reading};
 use crate::recording::{AtWork, Clip, Recording};
 
@@ -118,102 +117,101 @@ pub(super) fn infer(
     config: &Config,
 ) -> Result<ClipResult> {
     let Footage { recording, sketches, .. } = seen.footage;
+    let Located { reading, trajectory, closed, region, views, reason } = located;
     let mut result = ClipResult {
-        trajectory: located.trajectory,
-        closed_frames: located.closed,
-        region: located.region,
-        views: located.views,
-        ..ClipResult::unanswered(clip.clone(), located.reason.unwrap_or_default())
+        trajectory,
+        closed_frames: closed,
+        region,
+        views,
+        ..ClipResult::unanswered(clip.clone(), reason.unwrap_or_default())
     };
     let (Some(trajectory), Some(region)) = (&result.trajectory, &result.region) else { return Ok(result) };
 
-    result.lines = match config.geometry.lines {
-        LineMethod::Triangulated => tracks::at_region(seen.lines, region),
-        LineMethod::Unprojected => {
-            let in_views: Vec<&LiftedSegment> =
-                result.views.iter().filter_map(|v| seen.segments.get(v)).flatten().collect();
-            tracks::unprojected(&in_views, region, &config.geometry, config.seed)
-        }
-    };
+    result.lines = lines_at(region, &result.views, seen, config);
     result.words = reasoner.words(&Sight { recording, clip, region, views: &result.views, lines: &result.lines })?;
     let surface = surface(&seen.footage, region, &result.views, config);
-    let furniture = reasoning::furniture(&located.reading, result.words.as_ref());
-    let around = face::Surroundings {
-        surface: &surface,
-        grips: [region.grip, trajectory.open_grip()],
-        viewpoint: region.viewpoint,
-        manhattan: seen.room,
-        lines: &result.lines,
-        up: upward(recording, seen.room, config),
-        level: config.priors.hung.level_share(furniture, located.reading.strength() * config.reasoning.name_accuracy),
-    };
-    result.face = face::fit(&around, &config.geometry, &config.priors, config.seed);
+    result.face = touched(&result, &reading, &surface, seen, config);
 
-    let path = trajectory.positions();
     let open = open_state::open_views(recording, sketches, clip, trajectory, &config.part);
     let stops = result.face.as_ref().map_or_else(Vec::new, |f| edges_on(f, &result.lines, config));
     if let Some(face) = &result.face {
         result.part = outline::vote(face, &surface, &open, None, config).moving_rect(&stops);
     }
-    result.candidates = candidates::collect(
-        &candidates::Evidence {
-            // The paper knows no face: its lines and directions stay as they are.
-            face: result.face.as_ref().filter(|_| config.inference.method == InferenceMethod::Posterior),
-            rect: result.part.as_ref(),
-            tracks: &result.lines,
-            surface: &surface,
-            named: &result.words.as_ref().map_or_else(Vec::new, |w: &Words| w.named(result.lines.len())),
-            manhattan: seen.room,
-            grip: region.grip,
-            path: &path,
-        },
-        &config.inference,
-    );
-    if config.inference.method == InferenceMethod::Posterior {
-        result.candidates = weigh::settled(&result.candidates, std::slice::from_ref(&path), config);
-    }
-    let grip_std_m = hands::grip_std_m(trajectory.closed_end_seen());
-    let closed = result.face.map(|face| weigh::ClosedFront { face, rect: result.part, grip: region.grip, grip_std_m });
-    let shown = weigh::ClipEvidence {
-        reading: located.reading.clone(),
-        words: result.words.as_ref(),
-        path,
-        open: open.clone(),
-        closed: closed.into_iter().collect(),
+    let path = trajectory.positions();
+    let named = result.words.as_ref().map_or_else(Vec::new, |w: &Words| w.named(result.lines.len()));
+    let evidence = candidates::Evidence {
+        face: result.face.as_ref(),
+        rect: result.part.as_ref(),
+        tracks: &result.lines,
+        surface: &surface,
+        named: &named,
+        manhattan: seen.room,
+        grip: region.grip,
+        path: &path,
     };
-    let part =
-        weigh::AskedPart { grip: region.grip, face: result.face.as_ref(), shape: result.part.as_ref().map(part_shape) };
-    let mut answers = weigh::answers(&[shown], &part, &result.candidates, recording, reasoner, config);
-    let Some(answer) = answers.pop() else { return Ok(result) };
-    let face = result.face.as_ref();
-    result.joint = match config.inference.method {
-        InferenceMethod::Paper => {
-            let told = inference::paper::told(result.words.as_ref(), &located.reading);
-            inference::paper::infer(trajectory, &result.candidates, told, face, &config.inference, config.seed)
-        }
-        InferenceMethod::Posterior => inference::infer(
-            trajectory,
-            &result.candidates,
-            &answer,
-            face,
-            result.part.is_some() || (result.face.is_some() && located.reading.names_furniture()),
-            &config.reasoning,
-            &config.inference,
-        ),
-    };
+    let method = method::of(config);
+    result.candidates = method.candidates(&evidence, config);
+    let Some(answer) = answered(&result, &reading, &open, seen, reasoner, config) else { return Ok(result) };
+    result.joint = method.joint(&result, trajectory, &answer, &reading, config);
     // With the joint known, the part is also seen where the joint puts it: the rectangle again, from all evidence.
     if let (Some(face), Outcome::Found(joint)) = (&result.face, &result.joint) {
-        let votes = outline::vote(
-            face,
-            &surface,
-            &open,
-            Some((&joint.joint, &open_state::told(&joint.joint, &region.grip, &open))),
-            config,
-        );
+        let told = open_state::told(&joint.joint, &region.grip, &open);
+        let votes = outline::vote(face, &surface, &open, Some((&joint.joint, &told)), config);
         result.part = votes.moving_rect(&stops).or(result.part);
     }
     result.answer = Some(answer);
     Ok(result)
+}
+
+/// The 3D lines at a clip's region.
+fn lines_at(region: &Region, views: &[usize], seen: &Seen, config: &Config) -> Vec<LineTrack> {
+    match config.geometry.lines {
+        LineMethod::Triangulated => tracks::at_region(seen.lines, region),
+        LineMethod::Unprojected => {
+            let in_views: Vec<&LiftedSegment> = views.iter().filter_map(|v| seen.segments.get(v)).flatten().collect();
+            tracks::unprojected(&in_views, region, &config.geometry, config.seed)
+        }
+    }
+}
+
+/// The face that the hand touched, of a clip whose lines and words are known.
+fn touched(result: &ClipResult, reading: &Reading, surface: &[Point], seen: &Seen, config: &Config) -> Option<Face> {
+    let (trajectory, region) = (result.trajectory.as_ref()?, result.region.as_ref()?);
+    let furniture = reasoning::furniture(reading, result.words.as_ref());
+    let around = face::Surroundings {
+        surface,
+        grips: [region.grip, trajectory.open_grip()],
+        viewpoint: region.viewpoint,
+        manhattan: seen.room,
+        lines: &result.lines,
+        up: upward(seen.footage.recording, seen.room, config),
+        level: config.priors.hung.level_share(furniture, reading.strength() * config.reasoning.name_accuracy),
+    };
+    face::fit(&around, &config.geometry, &config.priors, config.seed)
+}
+
+/// What a clip answers about its candidates.
+fn answered(
+    result: &ClipResult,
+    reading: &Reading,
+    open: &[View],
+    seen: &Seen,
+    reasoner: &dyn Reasoner,
+    config: &Config,
+) -> Option<Answer> {
+    let (trajectory, region) = (result.trajectory.as_ref()?, result.region.as_ref()?);
+    let grip_std_m = hands::grip_std_m(trajectory.closed_end_seen());
+    let closed = result.face.map(|face| weigh::ClosedFront { face, rect: result.part, grip: region.grip, grip_std_m });
+    let shown = weigh::ClipEvidence {
+        reading: reading.clone(),
+        words: result.words.as_ref(),
+        path: trajectory.positions(),
+        open: open.to_vec(),
+        closed: closed.into_iter().collect(),
+    };
+    let part =
+        weigh::AskedPart { grip: region.grip, face: result.face.as_ref(), shape: result.part.as_ref().map(part_shape) };
+    weigh::answers(&[shown], &part, &result.candidates, seen.footage.recording, reasoner, config).pop()
 }
 
 /// Up, as the room's own upright edges have it where they are near the world's (which may be off by a degree).

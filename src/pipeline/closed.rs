@@ -1,7 +1,7 @@
 //! Which of a part's clips saw it closed best: the one that gives its front (ours).
 
-use super::ClipResult;
-use crate::config::{ClosedFronts, Config, InferenceMethod};
+use super::{ClipResult, method};
+use crate::config::{ClosedFronts, Config};
 use crate::geometry::Face;
 use crate::hands;
 use crate::math::{Point, signed_angle};
@@ -29,27 +29,54 @@ impl Grip {
     }
 }
 
-/// How well a clip saw the closed part, to compare clips of one part: how well its front bears out where the hands of all of the
-/// part's clips were when it was closed, and how much of what is near lies on it. Of the other clips' hands the paper says nothing.
-/// A logarithm: of hundreds of clips the product is no number.
-fn trust(clips: &[ClipResult], clip: usize, grips: &[Grip], config: &Config) -> f64 {
-    let (Some(face), Some(own)) = (&clips[clip].face, Grip::of(clips, clip)) else {
-        return f64::NEG_INFINITY;
-    };
-    let (rules, handles) = (&config.inference.closed, &config.priors.handles);
-    let handle = AtHandle { std_m: handles.standoff_std_m, rules };
-    let off = |grip: &Grip| face.coordinates(&grip.at)[2] - handles.standoff_m;
-    let moved = if clips[clip].part.is_some() { rules.moved } else { 1.0 };
-    match config.inference.method {
-        InferenceMethod::Paper => (handle.near(off(&own)) * (rules.thin_support + face.support) * moved).ln(),
-        InferenceMethod::Posterior => {
-            // The face was looked for near its own hand.
-            let lost_m = |grip: &Grip| if grip.clip == clip { hands::grip_std_m(false) } else { rules.travel_m };
-            let borne_out: f64 = grips.iter().map(|g| handle.at_front(off(g), g.seen, lost_m(g)).ln()).sum();
-            // A front is most of what is seen around a hand that holds it: half the support counts a quarter.
-            borne_out + (face.support.powi(2) * moved / own.std_m()).ln()
-        }
+/// The front that a clip saw, for comparison with those of the part's other clips.
+pub(super) struct SeenFront<'a> {
+    pub(super) face: &'a Face,
+    /// The clip's own hand.
+    pub(super) own: Grip,
+    /// It counts so many times as much: more than once where the part was seen to move.
+    pub(super) moved: f64,
+    handle: AtHandle<'a>,
+    /// How far handles stand off their fronts, metres.
+    standoff_m: f64,
+}
+
+impl<'a> SeenFront<'a> {
+    fn of(clips: &'a [ClipResult], clip: usize, config: &'a Config) -> Option<Self> {
+        let (rules, handles) = (&config.inference.closed, &config.priors.handles);
+        Some(Self {
+            face: clips[clip].face.as_ref()?,
+            own: Grip::of(clips, clip)?,
+            moved: if clips[clip].part.is_some() { rules.moved } else { 1.0 },
+            handle: AtHandle { std_m: handles.standoff_std_m, rules },
+            standoff_m: handles.standoff_m,
+        })
     }
+
+    /// How far a hand is off where handles usually are, metres; positive before the front.
+    fn off(&self, grip: &Grip) -> f64 {
+        self.face.coordinates(&grip.at)[2] - self.standoff_m
+    }
+
+    /// How likely the place of its own hand is.
+    pub(super) fn near_own(&self) -> f64 {
+        self.handle.near(self.off(&self.own))
+    }
+
+    /// How well it bears out where the hands of all of the part's clips were when it was closed, a logarithm.
+    pub(super) fn bears_out(&self, grips: &[Grip]) -> f64 {
+        // The face was looked for near its own hand.
+        let lost_m = |grip: &Grip| {
+            if grip.clip == self.own.clip { hands::grip_std_m(false) } else { self.handle.rules.travel_m }
+        };
+        grips.iter().map(|g| self.handle.at_front(self.off(g), g.seen, lost_m(g)).ln()).sum()
+    }
+}
+
+/// How well a clip saw the closed part, to compare clips of one part. A logarithm: of hundreds of clips the product is no number.
+fn trust(clips: &[ClipResult], clip: usize, grips: &[Grip], config: &Config) -> f64 {
+    let front = SeenFront::of(clips, clip, config);
+    front.map_or(f64::NEG_INFINITY, |front| method::of(config).trust(&front, grips, config))
 }
 
 /// Where hands that hold closed parts are.

@@ -3,7 +3,9 @@
 mod clip;
 mod closed;
 pub mod frames;
+mod group;
 mod looks;
+mod method;
 mod refit;
 mod room;
 mod scene;
@@ -20,7 +22,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::articulation::{Action, Articulation, Outcome};
-use crate::config::{Config, InferenceMethod, LineMethod, RoomFrame};
+use crate::config::{Config, LineMethod, RoomFrame};
 use crate::error::{Error, Result};
 use crate::geometry::Rect;
 use crate::geometry::segments::{LiftedSegment, LineDetector, lift};
@@ -259,9 +261,9 @@ pub fn infer_keeping(
     // The one place where names are taken away: whatever reads them later reads these clips.
     let unnamed = (!config.reasoning.use_names).then(|| narration::without_names(recording));
     let recording = unnamed.as_ref().unwrap_or(recording);
-    // The paper has no answer without depth.
-    let has_answer = recording.surfaces() == Surfaces::Depth || config.inference.method == InferenceMethod::Paper;
-    let mut scene = match has_answer {
+    // Where a method needs depth that is not there, the clips themselves say what they lack.
+    let by_depth = recording.surfaces() == Surfaces::Depth || method::of(config).needs_depth();
+    let mut scene = match by_depth {
         true => with_depth(recording, config, detector, reasoner, progress, store)?,
         false => without_depth::infer(recording, config, detector, reasoner, progress)?,
     };

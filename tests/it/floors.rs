@@ -106,3 +106,26 @@ fn only_the_command_line_and_the_store_of_answers_write_files() {
     }
     scan(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"));
 }
+
+#[test]
+fn one_place_asks_which_method_chooses_joints() {
+    fn askers(dir: &Path, out: &mut Vec<String>) {
+        for entry in std::fs::read_dir(dir).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                askers(&path, out);
+                continue;
+            }
+            let text = std::fs::read_to_string(&path).unwrap();
+            if text.split("#[cfg(test)]").next().unwrap().contains("InferenceMethod::") {
+                out.push(path.to_string_lossy().replace('\\', "/"));
+            }
+        }
+    }
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut found = Vec::new();
+    askers(&src, &mut found);
+    // The config says which it is; what it is asked for is what a `Method` answers.
+    found.retain(|file| !file.ends_with("src/config.rs") && !file.contains("src/config/"));
+    assert!(found.len() == 1 && found[0].ends_with("src/pipeline/method/mod.rs"), "{found:?}");
+}
