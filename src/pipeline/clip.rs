@@ -88,7 +88,8 @@ pub(super) fn locate(
             return located;
         }
     };
-    match localization::localize(footage, clip, &trajectory, &located.closed, &config.localization) {
+    match localization::localize(footage, clip, &trajectory, &located.closed, &config.localization, &config.hands.grips)
+    {
         Outcome::Found(region) => {
             located.views = views::reselect(footage.recording, idle, &region, occupancy, &config.localization);
             located.region = Some(region);
@@ -172,7 +173,7 @@ pub(super) fn infer(
     if config.inference.method == InferenceMethod::Posterior {
         result.candidates = weigh::settled(&result.candidates, std::slice::from_ref(&path), config);
     }
-    let grip_std_m = hands::grip_std_m(trajectory.closed_end_seen());
+    let grip_std_m = hands::grip_std_m(trajectory.closed_end_seen(), &config.hands.grips);
     let closed = result.face.map(|face| weigh::ClosedFront { face, rect: result.part, grip: region.grip, grip_std_m });
     let shown = weigh::ClipEvidence {
         reading: located.reading.clone(),

@@ -1,7 +1,7 @@
 //! Which of a part's clips saw it closed best: the one that gives its front (ours).
 
 use super::ClipResult;
-use crate::config::{ClosedFronts, Config, InferenceMethod};
+use crate::config::{ClosedFronts, Config, Grips, InferenceMethod};
 use crate::geometry::Face;
 use crate::hands;
 use crate::math::{Point, signed_angle};
@@ -24,8 +24,8 @@ impl Grip {
     }
 
     /// Standard deviation along the motion, metres.
-    pub(super) fn std_m(&self) -> f64 {
-        hands::grip_std_m(self.seen)
+    pub(super) fn std_m(&self, rules: &Grips) -> f64 {
+        hands::grip_std_m(self.seen, rules)
     }
 }
 
@@ -36,7 +36,7 @@ fn trust(clips: &[ClipResult], clip: usize, grips: &[Grip], config: &Config) -> 
     let (Some(face), Some(own)) = (&clips[clip].face, Grip::of(clips, clip)) else {
         return f64::NEG_INFINITY;
     };
-    let (rules, handles) = (&config.inference.closed, &config.priors.handles);
+    let (rules, handles, stds) = (&config.inference.closed, &config.priors.handles, &config.hands.grips);
     let handle = AtHandle { std_m: handles.standoff_std_m, rules };
     let off = |grip: &Grip| face.coordinates(&grip.at)[2] - handles.standoff_m;
     let moved = if clips[clip].part.is_some() { rules.moved } else { 1.0 };
@@ -44,10 +44,10 @@ fn trust(clips: &[ClipResult], clip: usize, grips: &[Grip], config: &Config) -> 
         InferenceMethod::Paper => (handle.near(off(&own)) * (rules.thin_support + face.support) * moved).ln(),
         InferenceMethod::Posterior => {
             // The face was looked for near its own hand.
-            let lost_m = |grip: &Grip| if grip.clip == clip { hands::grip_std_m(false) } else { rules.travel_m };
+            let lost_m = |grip: &Grip| if grip.clip == clip { hands::grip_std_m(false, stds) } else { rules.travel_m };
             let borne_out: f64 = grips.iter().map(|g| handle.at_front(off(g), g.seen, lost_m(g)).ln()).sum();
             // A front is most of what is seen around a hand that holds it: half the support counts a quarter.
-            borne_out + (face.support.powi(2) * moved / own.std_m()).ln()
+            borne_out + (face.support.powi(2) * moved / own.std_m(stds)).ln()
         }
     }
 }

@@ -157,7 +157,7 @@ fn pooled(
     let kept = |c: &&AxisCandidate| outlines.is_empty() || c.source != AxisSource::PartEdge;
     let own = clips[best].candidates.iter().filter(kept).cloned();
     let Some(face) = &clips[best].face else { return own.collect() };
-    let mut all = candidates::at_sides(face, outlines, grip);
+    let mut all = candidates::at_sides(face, outlines, grip, &config.sources);
     all.extend(own);
     let snap = config.snap_deg.to_radians();
     for &c in group.iter().filter(|&&c| c != best) {
@@ -418,7 +418,7 @@ fn judged(group: &Group, reasoner: &dyn Reasoner, trusted: &[usize], outlines: &
         Some(answer) => answer.joint = joint,
         None => {
             let own = clips[speaker].joint.found().unwrap_or(best_joint);
-            let chosen = uncertainty::chosen(own, &clips[speaker].candidates);
+            let chosen = uncertainty::chosen(own, &clips[speaker].candidates, &config.inference.sources);
             // The only one; where nobody computed a share, none is told.
             let [share, type_share] = [joint_probability, type_probability].map(|p| p.unwrap_or(1.0));
             all_likely.push(Likely { joint, chosen, share, type_share });
@@ -437,7 +437,7 @@ fn asked(
 ) -> Option<(Vec<AxisCandidate>, Answer)> {
     let Group { footage: Footage { recording, sketches, .. }, clips, members, config } = *group;
     let (grip, face) = (clips[best].joint.found()?.grip, clips[best].face);
-    let best_std_m = Grip::of(clips, best)?.std_m();
+    let best_std_m = Grip::of(clips, best)?.std_m(&config.hands.grips);
     let paths: Vec<Vec<Point>> =
         members.iter().filter_map(|&c| clips[c].trajectory.as_ref()).map(Trajectory::positions).collect();
     let pooled = pooled(clips, offering, best, &grip, outlines, &config.inference);
@@ -447,7 +447,8 @@ fn asked(
         if outlines.is_empty() { vec![clips[best].part] } else { outlines.iter().copied().map(Some).collect() };
     let shown = |&c: &usize| {
         let trajectory = clips[c].trajectory.as_ref()?;
-        let (own_grip, own_std_m) = (trajectory.closed_grip(), hands::grip_std_m(trajectory.closed_end_seen()));
+        let own_grip = trajectory.closed_grip();
+        let own_std_m = hands::grip_std_m(trajectory.closed_end_seen(), &config.hands.grips);
         // Depth and hands are biased clip by clip: the face and the grip of the clip itself fit its views best, those
         // of the best clip stand in where it did not see its closed end. Every candidate gets the same choice.
         let own = clips[c].face.filter(|own| {
@@ -563,7 +564,7 @@ fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Around, round
         moved: &moved,
         depth: depth.as_ref(),
     };
-    let uncertainty = uncertainty::of(&evidence, &config.reasoning, &config.part);
+    let uncertainty = uncertainty::of(&evidence, &config.reasoning, &config.part, &config.hands.grips);
     Hypothesis {
         joint,
         share: likely.share,
