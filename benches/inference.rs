@@ -48,8 +48,8 @@ fn posterior(c: &mut Criterion) {
         let agreement = if with_depth {
             let open = views::open_views(&recording, &sketches, &clip.clip, trajectory, &config.part);
             let depth = OpenDepth::of(face, clip.part.as_ref(), &open, &config.part);
-            let grip_std_m = hands::grip_std_m(trajectory.closed_end_seen());
-            likelihood::log_likelihoods(&depth, candidates.iter().map(|c| &c.joint), &grip, grip_std_m)
+            let grip_std = hands::GripStd::of(trajectory, &config.hands.grips);
+            likelihood::log_likelihoods(&depth, candidates.iter().map(|c| &c.joint), &grip, grip_std)
         } else {
             vec![0.0; candidates.len()]
         };

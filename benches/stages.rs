@@ -157,9 +157,10 @@ fn lsd(c: &mut Criterion) {
                     .collect()
             }
         };
+        let rules = config::EdgeDetector::default();
         stage(c, stage_name, || {
             for image in &images {
-                black_box(detector::detect(black_box(image), 10.0));
+                black_box(detector::detect(black_box(image), 10.0, &rules));
             }
         });
     }
@@ -264,8 +265,9 @@ fn lines3d_ransac(c: &mut Criterion) {
 /// The paper's rule over clips of 10 to 100 samples with 200 lines each: the line of least variance of the radius for a hinge,
 /// the nearest of the room's directions for a slide.
 fn score_axes(c: &mut Criterion) {
+    let sources = config::AxisSources::default();
     let hinge_at = |axis: Vector, origin: Point| {
-        AxisCandidate::new(Articulation { kind: JointKind::Revolute, axis, origin }, AxisSource::Line)
+        AxisCandidate::new(Articulation { kind: JointKind::Revolute, axis, origin }, AxisSource::Line, &sources)
     };
     let (paths, lines, kinds): (Vec<Vec<Point>>, Vec<Vec<AxisCandidate>>, Vec<i64>) = match (
         input::<f64>("score_axes", "z"),
@@ -319,7 +321,7 @@ fn score_axes(c: &mut Criterion) {
             let trajectory = Trajectory { side: None, samples, action: Action::Open, ends_seen: [true; 2] };
             candidates.extend([Vector::x(), Vector::y(), Vector::z()].map(|axis| {
                 let joint = Articulation { kind: JointKind::Prismatic, axis, origin: Point::origin() };
-                AxisCandidate::new(joint, AxisSource::Manhattan)
+                AxisCandidate::new(joint, AxisSource::Manhattan, &sources)
             }));
             (trajectory, candidates, if *kind == 0 { JointKind::Revolute } else { JointKind::Prismatic })
         })
@@ -350,7 +352,7 @@ fn look(c: &mut Criterion) {
     let scene = pipeline::infer(&recording, &config, &Lsd, &reasoner, &|_, _, _| {}).unwrap();
     let twin = fitting::fit(&scene, &recording.up(), &config.fitting, &config.priors);
     stage(c, "look", || {
-        black_box(appearance::look(black_box(&recording), &scene, &twin, &config.appearance).unwrap());
+        black_box(appearance::look(black_box(&recording), &scene, &twin, &config.hands, &config.appearance).unwrap());
     });
 }
 
@@ -381,6 +383,7 @@ fn encode(c: &mut Criterion) {
     let twin = Twin {
         name: "room".to_owned(),
         density_kg_per_m3: 700.0,
+        drives: paws_twin::config::Drives::default(),
         furniture: Vec::new(),
         room: Vec::new(),
         left_out: Vec::new(),

@@ -92,7 +92,14 @@ fn hand(furniture: &Furniture) -> Trajectory {
 fn kitchen(units: usize) -> Twin {
     // Two rows, one above the other.
     let furniture = (0..units).map(|i| unit(i, 0.5 * (i / 2) as f64, 0.72 * (i % 2) as f64)).collect();
-    Twin { name: "kitchen".to_owned(), density_kg_per_m3: 700.0, furniture, room: Vec::new(), left_out: Vec::new() }
+    Twin {
+        name: "kitchen".to_owned(),
+        density_kg_per_m3: 700.0,
+        drives: paws_twin::config::Drives::default(),
+        furniture,
+        room: Vec::new(),
+        left_out: Vec::new(),
+    }
 }
 
 fn proof(c: &mut Criterion, name: &str, units: usize) {

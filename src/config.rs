@@ -37,7 +37,7 @@ pub use inference::*;
 pub use localization::*;
 pub use part::*;
 pub use primitives::*;
-pub use priors::{Boards, Fronts, Handles, Hanging, Hung, Named, PriorSet, Priors, Ranges, Resistance};
+pub use priors::{Boards, Drives, Fronts, Handles, Hanging, Hung, Named, PriorSet, Priors, Ranges, Resistance};
 pub use reasoning::*;
 pub use validation::*;
 use values::{overlay, wrong};

@@ -234,8 +234,8 @@ pub fn replay(
 ///
 /// # Errors
 /// Pictures that cannot be decoded.
-pub fn look(recording: &Recording, scene: &Scene, twin: &Twin, config: &config::Appearance) -> Result<Option<Look>> {
-    let look = appearance::look(recording, scene, twin, config)?;
+pub fn look(recording: &Recording, scene: &Scene, twin: &Twin, config: &Config) -> Result<Option<Look>> {
+    let look = appearance::look(recording, scene, twin, &config.hands, &config.appearance)?;
     Ok(export::dress::shows(twin, &look)?.then_some(look))
 }
 

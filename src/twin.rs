@@ -6,7 +6,11 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 use crate::articulation::{Articulation, JointKind};
+use crate::config::Drives;
 use crate::math::{Point, Pose, Vector};
+
+/// Definition: of gravity, m/s^2, as simulators have it.
+pub(crate) const GRAVITY: f64 = 9.81;
 
 /// A box of any orientation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -105,6 +109,7 @@ impl OrientedBox {
 /// Intersection over union of two boxes, by a grid of 24^3 points in each; good to about 0.02.
 #[must_use]
 pub fn box_iou(a: &OrientedBox, b: &OrientedBox) -> f64 {
+    /// Numerics: points along each side of a box.
     const N: usize = 24;
     let share = |from: &OrientedBox, of: &OrientedBox| {
         let at = |i: usize| (i as f64 + 0.5) / N as f64 * 2.0 - 1.0;
@@ -225,6 +230,9 @@ pub struct Twin {
     pub name: String,
     /// Density of all boxes, kg/m^3.
     pub density_kg_per_m3: f64,
+    /// The most that moves a joint, as the formats have limits of it.
+    #[serde(default, skip_serializing_if = "is_usual")]
+    pub drives: Drives,
     /// Furniture in the order of the joints.
     pub furniture: Vec<Furniture>,
     /// What stands around the furniture and does not move; shares no space with any part on its way.
@@ -233,6 +241,10 @@ pub struct Twin {
     /// Joints that could not be built, with the reason.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<LeftOut>,
+}
+
+fn is_usual(drives: &Drives) -> bool {
+    *drives == Drives::default()
 }
 
 /// A joint that is not in the twin.
@@ -294,7 +306,7 @@ pub fn mass_properties(solids: &[Solid], density: f64) -> Option<MassProperties>
     Some(MassProperties { mass, center: Point::from(center), inertia: (inertia + inertia.transpose()) * 0.5 })
 }
 
-/// A home is smaller, and single precision still tells millimetres there.
+/// Format: metres; a home is smaller, and single precision still tells millimetres there.
 pub(crate) const FAR_M: f64 = 1e3;
 
 fn is_rotation(m: &Matrix3<f64>) -> bool {
@@ -364,7 +376,7 @@ impl Part {
     #[must_use]
     pub fn opens_by_itself(&self, up: &Vector, density: f64) -> bool {
         mass_properties(&self.solids, density).is_some_and(|mass| {
-            let weight = up * (-9.81 * mass.mass);
+            let weight = up * (-GRAVITY * mass.mass);
             self.joint.articulation.effort(&mass.center, &weight) > self.joint.friction
         })
     }
@@ -373,19 +385,19 @@ impl Part {
 impl Joint {
     /// The most force (N) or torque (N m) an actuator or a person may apply through the joint.
     #[must_use]
-    pub fn effort(&self) -> f64 {
+    pub fn effort(&self, drives: &Drives) -> f64 {
         match self.articulation.kind {
-            JointKind::Revolute => 50.0,
-            JointKind::Prismatic => 200.0,
+            JointKind::Revolute => drives.hinge_effort,
+            JointKind::Prismatic => drives.slide_effort,
         }
     }
 
     /// Velocity limit, rad/s or m/s.
     #[must_use]
-    pub fn velocity(&self) -> f64 {
+    pub fn velocity(&self, drives: &Drives) -> f64 {
         match self.articulation.kind {
-            JointKind::Revolute => 6.0,
-            JointKind::Prismatic => 2.0,
+            JointKind::Revolute => drives.hinge_velocity,
+            JointKind::Prismatic => drives.slide_velocity,
         }
     }
 }
@@ -425,6 +437,22 @@ mod tests {
         )
         .unwrap();
         assert!((whole.mass - halves.mass).abs() < 1e-9 && (whole.inertia - halves.inertia).norm() < 1e-9);
+    }
+
+    #[test]
+    fn drives_are_written_where_they_are_not_the_usual_ones() {
+        let mut twin = Twin {
+            name: String::new(),
+            density_kg_per_m3: 700.0,
+            drives: Drives::default(),
+            furniture: Vec::new(),
+            room: Vec::new(),
+            left_out: Vec::new(),
+        };
+        assert!(!serde_json::to_string(&twin).unwrap().contains("drives"));
+        twin.drives.hinge_effort = 30.0;
+        let back: Twin = serde_json::from_str(&serde_json::to_string(&twin).unwrap()).unwrap();
+        assert_eq!(back, twin);
     }
 
     #[test]

@@ -48,16 +48,22 @@ pub fn lacking(recording: &Recording) -> Option<&'static str> {
 }
 
 /// The looks of a twin, from the recording that it was made of and what was inferred from it. Empty where no frame has depth,
-/// grey where none has an image ([`lacking`] says so).
+/// grey where none has an image ([`lacking`] says so). The rules of hands tell when parts moved.
 ///
 /// # Errors
 /// Images that cannot be decoded.
-pub fn look(recording: &Recording, scene: &Scene, twin: &Twin, config: &config::Appearance) -> Result<Look> {
+pub fn look(
+    recording: &Recording,
+    scene: &Scene,
+    twin: &Twin,
+    hands: &config::Hands,
+    config: &config::Appearance,
+) -> Result<Look> {
     // Through the holes of a sparse reconstruction shows what is behind it.
     if recording.surfaces() < Surfaces::Depth {
         return Ok(Look::default());
     }
-    let timelines = scene.timelines(recording);
+    let timelines = scene.timelines(recording, hands);
     let chosen = frame_choice::choose(recording, scene, &timelines, config);
     let Some(origin) = chosen.first().and_then(|f| recording.frames.get(*f)).map(crate::recording::Frame::center)
     else {
@@ -229,6 +235,7 @@ mod tests {
         let twin = Twin {
             name: "r".to_owned(),
             density_kg_per_m3: 700.0,
+            drives: crate::config::Drives::default(),
             furniture: Vec::new(),
             room: Vec::new(),
             left_out: Vec::new(),
@@ -351,7 +358,7 @@ mod tests {
         let (blocks, views) = (checkered(), before_the_wall());
         let recording = recorded(dir.path(), &blocks, &views, true);
         let (scene, twin) = nothing_moves();
-        let look = look(&recording, &scene, &twin, &config::Appearance::default()).unwrap();
+        let look = look(&recording, &scene, &twin, &config::Hands::default(), &config::Appearance::default()).unwrap();
         let mut levels: [Vec<f64>; 2] = Default::default();
         for x in -4..4 {
             for z in 1..7 {
@@ -381,7 +388,7 @@ mod tests {
         let config = config::Appearance { triangles: 2000, ..Default::default() };
         let run = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| look(&recording, &scene, &twin, &config).unwrap())
+            pool.install(|| look(&recording, &scene, &twin, &config::Hands::default(), &config).unwrap())
         };
         let one = run(1);
         assert_eq!(one, run(4));
@@ -401,12 +408,12 @@ mod tests {
         let mut recording = recorded(dir.path(), &checkered(), &before_the_wall(), false);
         let (scene, twin) = nothing_moves();
         let config = config::Appearance::default();
-        let grey = look(&recording, &scene, &twin, &config).unwrap();
+        let grey = look(&recording, &scene, &twin, &config::Hands::default(), &config).unwrap();
         assert!(lacking(&recording).is_some_and(|why| why.contains("grey")));
         assert_eq!((grey.textures.len(), grey.room.len(), grey.room[0].seen), (1, 1, 0.0));
         assert!(grey.textures[0].rgb.iter().all(|c| *c == grey.textures[0].rgb[0]));
         recording.frames.iter_mut().for_each(|f| f.files.depth = None);
         assert!(lacking(&recording).is_some_and(|why| why.contains("depth")));
-        assert_eq!(look(&recording, &scene, &twin, &config).unwrap(), Look::default());
+        assert_eq!(look(&recording, &scene, &twin, &config::Hands::default(), &config).unwrap(), Look::default());
     }
 }

@@ -13,7 +13,7 @@ use super::primitives::{hands_beside, rows_beside};
 use super::progress::Steps;
 use super::{Answer, ConfigFile, Opening, look, print, shown};
 use crate::articulation::Action;
-use crate::config::Config;
+use crate::config::{self, Config};
 use crate::evaluation::front_errors::{self, FrontErrors};
 use crate::evaluation::likeness::{self, Contender, ContenderSummary, FrameLikeness, STATIC};
 use crate::evaluation::shots::{self, Shot, Shots};
@@ -105,6 +105,7 @@ impl Given {
             let twin = Twin {
                 name: String::new(),
                 density_kg_per_m3: 1.0,
+                drives: config::Drives::default(),
                 furniture: Vec::new(),
                 room: Vec::new(),
                 left_out: Vec::new(),
@@ -148,7 +149,7 @@ pub fn run(args: &CompareArgs) -> anyhow::Result<Answer> {
     let mut recording = args.door.open(args.opening, &args.recording)?;
     let given = Given::read(args)?;
     let timelines = match &given.folder {
-        Some(folder) => timelines(folder, &given.twin, &mut recording)?,
+        Some(folder) => timelines(folder, &given.twin, &mut recording, &config.hands)?,
         None => Vec::new(),
     };
     let shots = shots::choose(&recording, &given.twin, &timelines, &config.comparison);
@@ -242,7 +243,12 @@ struct Articulations {
 }
 
 /// When each part of a twin stood closed or open, by the answer beside it. Clips that were found in the recording become its own.
-fn timelines(folder: &Path, twin: &Twin, recording: &mut Recording) -> anyhow::Result<Vec<Timeline>> {
+fn timelines(
+    folder: &Path,
+    twin: &Twin,
+    recording: &mut Recording,
+    config: &config::Hands,
+) -> anyhow::Result<Vec<Timeline>> {
     let path = folder.join("articulations.json");
     if !path.is_file() {
         bail!("{}: no such file; a folder that `paws twin` wrote has one", shown(&path));
@@ -272,7 +278,7 @@ fn timelines(folder: &Path, twin: &Twin, recording: &mut Recording) -> anyhow::R
         });
         shown.chain(told).collect()
     };
-    Ok(twin.furniture.iter().map(|f| Timeline::of(recording, &motions(&f.part.id))).collect())
+    Ok(twin.furniture.iter().map(|f| Timeline::of(recording, &motions(&f.part.id), config)).collect())
 }
 
 /// The shape of what does not move, where the true kitchen is known.

@@ -210,6 +210,7 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<Answer> {
         true => json::text(&primitives::of(
             &twin,
             &seen(&gathered.hands, &verdicts, &gathered.rows),
+            &crate::config::Grips::default(),
             &crate::config::Primitives::default(),
         ))?,
         false => String::new(),

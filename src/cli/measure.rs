@@ -46,7 +46,7 @@ pub fn run(args: &MeasureArgs) -> anyhow::Result<Answer> {
         let reasoner = Geometric::of(&config);
         let scene = pipeline::infer(recording, &config, &Lsd, &reasoner, &|_, _, _| {})?;
         let mut stages = measure(&scene, truth);
-        measure_segments(recording, truth, &Lsd, &mut stages)?;
+        measure_segments(recording, truth, &Lsd, &config.geometry.detector, &mut stages)?;
         let twin = fitting::fit(&scene, &recording.up(), &config.fitting, &config.priors);
         stages.room = room_fit::measure(recording, &scene, &twin, &config.fitting)?;
         if args.each {

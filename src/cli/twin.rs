@@ -180,7 +180,8 @@ pub fn make(
     output.write("twin.json", json::text(&twin)?)?;
     output.write("validation.json", json::text(&validation)?)?;
     let verdicts = validation.words();
-    let moves = primitives::of(&twin, &super::primitives::seen(&hands, &verdicts, &rows), &config.primitives);
+    let seen = super::primitives::seen(&hands, &verdicts, &rows);
+    let moves = primitives::of(&twin, &seen, &config.hands.grips, &config.primitives);
     output.write("primitives.json", json::text(&moves)?)?;
     for (furniture, check) in twin.furniture.iter().zip(&validation.joints) {
         output.write(&format!("proof/{}.svg", file_name(&check.id)), drawings::proof(furniture, check))?;
@@ -196,7 +197,7 @@ pub fn make(
     };
     let notes: Vec<FileNote> = file_notes().into_iter().filter(is_there).collect();
     let pictured = match wishes.textures {
-        true => page_frames::frames(&recording, &scene, &twin, &config.comparison).unwrap_or_else(|error| {
+        true => page_frames::frames(&recording, &scene, &twin, config).unwrap_or_else(|error| {
             lost.push(format!("recorded frames of the page: {error}"));
             Vec::new()
         }),
@@ -248,7 +249,7 @@ fn looked(
     steps: &Steps,
 ) -> crate::error::Result<Option<Look>> {
     steps.report("textures", 0, 1);
-    make::look(recording, scene, twin, &config.appearance)
+    make::look(recording, scene, twin, config)
 }
 
 /// Writes the twin in all formats; returns the file for viewers.

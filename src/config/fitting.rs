@@ -51,6 +51,8 @@ block! {
         least_depth_m: f64 = 0.1, "m", "ours";
         /// Where a shallower carcass has no space either, its front is made smaller by these factors.
         front_shares: [f64; 3] = [1.0, 0.85, 0.7], "-", "ours";
+        /// The ends of an observed motion are known to about this: of a hinge in rad, of a slide in m. Judgement.
+        observed_noise: [f64; 2] = [0.09, 0.03], "rad or m", "ours";
         /// Ajar: past the catch. Judgement.
         ajar_rad: f64 = 0.09, "rad", "ours";
         /// A lever of gravity that friction does not hold. Judgement.

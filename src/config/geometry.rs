@@ -40,6 +40,8 @@ block! {
         /// Without depth: frames in which nobody is at work whose lines are looked for around a grip.
         sighting_frames: usize = 16, "frames", "ours";
     } parts {
+        /// The built-in detector of segments.
+        detector: EdgeDetector;
         /// The face of the touched furniture.
         face: FaceRules;
         /// Fronts that nobody saw.
@@ -54,6 +56,19 @@ block! {
         frame: RoomFrame;
         /// The scale of each frame's depth.
         scales: DepthScales;
+    }
+}
+
+block! {
+    /// What the built-in detector of 2D segments takes for an edge (ours). Judgements.
+    EdgeDetector, "geometry.detector", {
+        /// Of an edge's profile the part above this share of its steepest place makes the region; the foot below it belongs to the
+        /// edge too but blurs with its surroundings.
+        foot_share: f64 = 0.2, "share", "ours";
+        /// A gradient that no camera's quantisation makes.
+        least_gradient: f64 = 3.0, "grey values/px", "ours";
+        /// Gradients below so many standard deviations of the image's noise are not looked at.
+        noise_stds: f64 = 4.0, "-", "ours";
     }
 }
 

@@ -38,7 +38,12 @@ block! {
         seen_secs: f64 = 0.35, "s", "ours";
         /// A hand that is not seen for longer may have let go. Judgement.
         gap_secs: f64 = 0.5, "s", "ours";
+        /// A part moves from this long before its contact flags begin until this long after they end: flags begin late and end early
+        /// by a fraction of a second. Judgement.
+        moves_around_secs: f64 = 0.3, "s", "ours";
     } parts {
+        /// How well a hand tells where it holds a part.
+        grips: Grips;
         /// A hand by the depth around it, and what a single sample is worth.
         contact: Contact;
         /// The way of a hand.
@@ -47,6 +52,16 @@ block! {
         alone: HandAlone;
         /// Interactions that nobody told.
         found: Found;
+    }
+}
+
+block! {
+    /// How well a hand tells where it holds a part, along the motion: standard deviations (ours). Judgements.
+    Grips, "hands.grips", {
+        /// Of a grip where the hand was seen to take hold or let go.
+        seen_std_m: f64 = 0.03, "m", "ours";
+        /// Of a grip where the hand was lost on the way: about a third of what a drawer or the handle of a door travels.
+        lost_std_m: f64 = 0.12, "m", "ours";
     }
 }
 

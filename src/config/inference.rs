@@ -77,6 +77,8 @@ block! {
         /// drawn once in ten million.
         prismatic_draws: usize = 60, "-", "ours";
     } parts {
+        /// How well what a hinge was found from places it.
+        sources: AxisSources;
         /// Hinges where the face meets another side of the furniture.
         plane_edges: PlaneEdges;
         /// Hinges in the middle of the arc that a hand drew.
@@ -89,6 +91,24 @@ block! {
         closed: ClosedFronts;
         /// Hinge and openings from the depth of all clips' open states.
         states: OpenStateRules;
+    }
+}
+
+block! {
+    /// How well what a hinge was found from places it across its axis: standard deviations (ours). All are judgements.
+    AxisSources, "inference.sources", {
+        /// Of lines, and of edges where the face meets another side: a hinge is set back from the edge that one sees. What a line's own
+        /// fit adds is its own.
+        line_std_m: f64 = 0.02, "m", "ours";
+        /// Of edges of the part that was seen to move: next to a hinge a door hardly moves, so the outline ends a few centimetres short
+        /// of it.
+        part_edge_std_m: f64 = 0.06, "m", "ours";
+        /// Of edges of the visible face, which may belong to the whole piece of furniture.
+        face_edge_std_m: f64 = 0.08, "m", "ours";
+        /// Of fronts of a usual size, whose edge nobody saw: half of the way between two usual sizes.
+        assumed_std_m: f64 = 0.08, "m", "ours";
+        /// Of the arc that the hand drew, and of whatever else: the fit itself tells more.
+        other_std_m: f64 = 0.2, "m", "ours";
     }
 }
 

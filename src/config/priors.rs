@@ -153,6 +153,16 @@ group! {
 }
 
 group! {
+    /// The most that moves joints.
+    Drives, "drives", {
+        hinge_effort: f64,
+        hinge_velocity: f64,
+        slide_effort: f64,
+        slide_velocity: f64,
+    }
+}
+
+group! {
     /// How far parts open.
     Ranges, "ranges", {
         door_deg: f64,
@@ -180,6 +190,8 @@ pub struct Priors {
     pub boards: Boards,
     /// What joints resist with.
     pub resistance: Resistance,
+    /// The most that moves joints.
+    pub drives: Drives,
     /// How far parts open.
     pub ranges: Ranges,
 }
@@ -195,6 +207,7 @@ impl Priors {
             handles: Handles::of(set),
             boards: Boards::of(set),
             resistance: Resistance::of(set),
+            drives: Drives::of(set),
             ranges: Ranges::of(set),
         }
     }
@@ -222,6 +235,7 @@ impl Priors {
         self.handles.rows(rows);
         self.boards.rows(rows);
         self.resistance.rows(rows);
+        self.drives.rows(rows);
         self.ranges.rows(rows);
     }
 
@@ -373,6 +387,8 @@ mod tests {
         assert!(0.5 * upright == bottom && bottom == top && out == aside && aside == lift);
         assert_eq!(flat.hung.lid_far_edge, 0.25);
         assert_eq!(flat.hung.level_share(Some("chest"), 0.9), 0.5);
+        // Every size is as likely, and every part is as likely shut as ajar.
+        assert!(flat.fronts.size_spread > 50.0 && flat.ranges.shut_share == 0.5);
         // What furniture is made of is no belief about a joint.
         assert_eq!(flat.boards, Priors::default().boards);
     }

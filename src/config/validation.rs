@@ -9,6 +9,9 @@ block! {
     Validation, "validation", {
         /// Step of the simulation.
         step_secs: f64 = 1.0 / 240.0, "s", "ours";
+        /// Friction between the boxes of a part and what it touches: boards and fronts of furniture slide on each other more than they
+        /// stick. Judgement.
+        board_friction: f64 = 0.2, "-", "ours";
         /// Stiffness of the hand's grip.
         hand_stiffness_n_per_m: f64 = 800.0, "N/m", "ours";
         /// The most a person's arm pulls.

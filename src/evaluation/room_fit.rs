@@ -94,12 +94,12 @@ pub fn measure(recording: &Recording, scene: &Scene, twin: &Twin, config: &confi
         free_views: config.room_free_views,
         rules: &config.gathered,
     };
-    Ok(held_against(&gather(&recording, &views, &how), twin))
+    Ok(held_against(&gather(&recording, &views, &how), twin, config))
 }
 
 /// Holds a twin against what is known of the cells around it.
 #[must_use]
-pub fn held_against(cells: &RoomCells, twin: &Twin) -> RoomFit {
+pub fn held_against(cells: &RoomCells, twin: &Twin, config: &config::Fitting) -> RoomFit {
     let grown = |shape: &OrientedBox| OrientedBox { half: shape.half.map(|h| h + cells.edge_m), ..*shape };
     let room: Vec<OrientedBox> = twin.room.iter().map(|s| s.shape).collect();
     let carcasses = twin.furniture.iter().flat_map(|f| &f.carcass).count();
@@ -108,7 +108,7 @@ pub fn held_against(cells: &RoomCells, twin: &Twin) -> RoomFit {
     // Views of an open door show its leaf and what is behind it: that is not the room's.
     let bodies = twin.furniture.iter().map(body);
     let moving: Vec<OrientedBox> =
-        twin.furniture.iter().flat_map(|f| sweep(&f.part)).chain(bodies).map(|b| grown(&b)).collect();
+        twin.furniture.iter().flat_map(|f| sweep(&f.part, config)).chain(bodies).map(|b| grown(&b)).collect();
     let inside = |boxes: &[OrientedBox], p: &Point| boxes.iter().any(|b| b.contains(p));
     let surfaces: BTreeMap<[i32; 3], &RoomCell> = cells.cells.iter().map(|c| (c.index, c)).collect();
     let [surface, missing] = cells
@@ -222,10 +222,16 @@ mod tests {
         Twin {
             name: String::new(),
             density_kg_per_m3: 700.0,
+            drives: crate::config::Drives::default(),
             furniture: Vec::new(),
             room: room.into_iter().map(solid).collect(),
             left_out: Vec::new(),
         }
+    }
+
+    /// Boxes of a room, by centre and half sizes, against its cells.
+    fn against(cells: &RoomCells, room: Vec<([f64; 3], [f64; 3])>) -> RoomFit {
+        held_against(cells, &twin(room), &config::Fitting::default())
     }
 
     /// A wall of a square metre at x = 1.005, and free air for a metre before it, two cells away.
@@ -245,7 +251,7 @@ mod tests {
         let cells = wall();
         let of = |low: f64, high: f64| {
             let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
-            held_against(&cells, &twin(vec![([middle, 0.5, 0.5], [half, 0.6, 0.6])]))
+            against(&cells, vec![([middle, 0.5, 0.5], [half, 0.6, 0.6])])
         };
         let exact = of(1.005, 1.055);
         assert_eq!((exact.room_boxes, exact.surface_cells), (1, 33 * 33));
@@ -255,7 +261,7 @@ mod tests {
         assert_eq!(of(1.05, 1.1).missing(), Some(1.0));
         let thick = of(0.89, 1.05);
         assert_eq!((thick.missing_cells, thick.filled()), (0, Some(2.0)));
-        assert_eq!(held_against(&cells, &twin(Vec::new())).missing(), Some(1.0));
+        assert_eq!(against(&cells, Vec::new()).missing(), Some(1.0));
         let pooled = RoomFit::pooled([&exact, &thick]);
         assert_eq!((pooled.room_boxes, pooled.filled()), (2, Some(1.0)));
         assert_eq!(RoomFit::default().filled(), None);
@@ -270,9 +276,9 @@ mod tests {
             cell.extent[0] = cell.extent[0].map(|x| x + off);
             cell.index[0] = (0.5 * (cell.extent[0][0] + cell.extent[0][1]) / CELL_M).floor() as i32;
         }
-        let fit = held_against(&cells, &twin(vec![([1.03, 0.5, 0.5], [0.025, 0.6, 0.6])]));
+        let fit = against(&cells, vec![([1.03, 0.5, 0.5], [0.025, 0.6, 0.6])]);
         assert!(fit.missing_cells < 40, "{fit:?}");
-        let fit = held_against(&cells, &twin(vec![([1.09, 0.5, 0.5], [0.025, 0.6, 0.6])]));
+        let fit = against(&cells, vec![([1.09, 0.5, 0.5], [0.025, 0.6, 0.6])]);
         assert!(fit.missing() > Some(0.9), "{fit:?}");
     }
 }

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::room_fit::RoomFit;
 use crate::articulation::JointKind;
+use crate::config;
 use crate::error::{Error, Result};
 use crate::geometry::segments::{LineDetector, Segment2};
 use crate::json;
@@ -240,6 +241,7 @@ pub fn measure_segments(
     recording: &Recording,
     truth: &SceneTruth,
     detector: &dyn LineDetector,
+    rules: &config::EdgeDetector,
     stages: &mut Stages,
 ) -> Result<()> {
     const FRAMES: usize = 20;
@@ -249,7 +251,7 @@ pub fn measure_segments(
     for frame in views::survey(recording, &AtWork::of(recording), FRAMES) {
         let segments: Vec<Segment2> = match (recording.segments(frame)?, recording.grey(frame)?) {
             (Some(ends), _) => ends.into_iter().map(|[a, b]| Segment2 { a, b }).collect(),
-            (None, Some(grey)) => detector.detect(&grey, LEAST_PX),
+            (None, Some(grey)) => detector.detect(&grey, LEAST_PX, rules),
             (None, None) => continue,
         };
         let segments: Vec<Segment2> = segments.into_iter().filter(|s| s.length() >= LEAST_PX).collect();

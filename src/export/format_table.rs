@@ -250,6 +250,7 @@ mod tests {
         let twin = Twin {
             name: "empty".to_owned(),
             density_kg_per_m3: 700.0,
+            drives: crate::config::Drives::default(),
             furniture: Vec::new(),
             room: Vec::new(),
             left_out: Vec::new(),

@@ -253,7 +253,7 @@ pub fn write(twin: &Twin, look: Option<&Look>, verdicts: Verdicts) -> Result<Vec
         let part = &f.part;
         let own = dress.part(&part.id);
         let origin = part.joint.articulation.origin;
-        let mut extras = extras(part, twin.density_kg_per_m3);
+        let mut extras = extras(part, twin);
         let verdict = verdicts.iter().find(|(id, _)| *id == part.id).map_or("unknown", |(_, v)| v.as_str());
         extras["joint"]["verdict"] = json!(verdict);
         let pivot = scene.push(json!({
@@ -316,7 +316,7 @@ pub fn write_physics(twin: &Twin) -> Result<Vec<u8>> {
             "name": part.id, "translation": origin, "rotation": turn,
             "extensions": {RIGID_BODIES: {"joint":
                 {"connectedNode": frame, "joint": joints.len(), "enableCollision": false}}},
-            "extras": extras(part, twin.density_kg_per_m3),
+            "extras": extras(part, twin),
         }));
         children.push(joint);
         joints.push(limits(part));
@@ -342,14 +342,15 @@ pub fn write_physics(twin: &Twin) -> Result<Vec<u8>> {
 }
 
 /// What a joint's node says to those who read no extension: rad, m, N, kg.
-fn extras(part: &Part, density: f64) -> Value {
+fn extras(part: &Part, twin: &Twin) -> Value {
     let (joint, phi) = (&part.joint, part.joint.articulation);
     json!({"joint": {
         "id": part.id, "label": part.label, "kind": phi.kind, "axis": phi.axis.as_slice(),
         "lower": 0.0, "upper": joint.upper, "observed": joint.observed, "expected": joint.expected,
         "damping": joint.damping, "friction": joint.friction, "resistance_seen": joint.resistance_seen,
-        "balanced": joint.balanced, "effort": joint.effort(), "velocity": joint.velocity(),
-        "mass": mass_properties(&part.solids, density).map(|m| m.mass),
+        "balanced": joint.balanced, "effort": joint.effort(&twin.drives),
+        "velocity": joint.velocity(&twin.drives),
+        "mass": mass_properties(&part.solids, twin.density_kg_per_m3).map(|m| m.mass),
     }})
 }
 

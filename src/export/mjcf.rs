@@ -115,11 +115,14 @@ fn body_name(id: &str) -> String {
     format!("{id}_link")
 }
 
-/// How a limit stops a joint: time constant in s, damping ratio (MuJoCo, "Solver parameters").
+/// Numerics: how a limit stops a joint: time constant in s, damping ratio (MuJoCo, "Solver parameters").
 ///
 /// Two steps of 2 ms, the shortest that MuJoCo keeps. A limit pushes one way only: critically damped it throws a part back
 /// at exp(-2) = 14 % of its speed, and at 25 % where a step ends deep in it; twice as damped, at 6 % whatever the step.
 const LIMIT_SOLREF: &str = "0.004 2";
+/// Numerics: inertia that MuJoCo adds to a joint, kg m^2 or kg, for matrices that are well conditioned however light a part is; a
+/// cupboard's door has some hundred times as much.
+const ARMATURE: &str = "0.001";
 
 fn defaults(xml: &mut Xml) -> std::io::Result<()> {
     xml.create_element("default").write_inner_content(|xml| {
@@ -141,7 +144,7 @@ fn defaults(xml: &mut Xml) -> std::io::Result<()> {
                     .with_attributes([
                         ("type", kind),
                         ("limited", "true"),
-                        ("armature", "0.001"),
+                        ("armature", ARMATURE),
                         ("solreflimit", LIMIT_SOLREF),
                     ])
                     .write_empty()?;

@@ -80,6 +80,11 @@ pub(super) fn names(twin: &Twin) -> Result<BTreeSet<String>> {
     if !(twin.density_kg_per_m3.is_finite() && twin.density_kg_per_m3 > 0.0) {
         return fault(format!("density {} must be positive", twin.density_kg_per_m3));
     }
+    let drives = &twin.drives;
+    let most = [drives.hinge_effort, drives.hinge_velocity, drives.slide_effort, drives.slide_velocity];
+    if !most.iter().all(|x| x.is_finite() && *x > 0.0) {
+        return fault("drives: efforts and velocities must be positive".to_owned());
+    }
     if twin.name.chars().any(char::is_control) {
         return fault("the twin's name has control characters".to_owned());
     }

@@ -52,8 +52,8 @@ pub fn write(twin: &Twin, look: Option<&Look>) -> Result<String> {
             limit: JointLimit {
                 lower: 0.0,
                 upper: part.joint.upper,
-                effort: part.joint.effort(),
-                velocity: part.joint.velocity(),
+                effort: part.joint.effort(&twin.drives),
+                velocity: part.joint.velocity(&twin.drives),
             },
             calibration: None,
             dynamics: Some(Dynamics { damping: part.joint.damping, friction: part.joint.friction }),

@@ -11,13 +11,11 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 use super::dress::{self, Dress, Piece};
 use super::shared::{MATERIALS, ROLES, ROOM, ROOT, color, from_x, local_pose, material, principal};
 use crate::articulation::JointKind;
+use crate::config::Drives;
 use crate::error::{Error, Result};
 use crate::look::{Look, Texture};
 use crate::math::{Point, Vector};
-use crate::twin::{Furniture, Solid, Twin, mass_properties};
-
-/// Format: gravity, m/s^2.
-const GRAVITY: f64 = 9.81;
+use crate::twin::{Furniture, GRAVITY, Solid, Twin, mass_properties};
 
 /// Format: steps of normals' coordinates; half a degree is not seen, and its numbers are short.
 const STEPS_OF_NORMALS: f64 = 100.0;
@@ -124,7 +122,7 @@ fn text(twin: &Twin, dress: &Dress, picture: &dyn Fn(&Texture) -> String) -> Str
     out.open(&format!("Xform \"{ROOT}\""), &[scene, vec!["kind = \"component\"".to_owned()]].concat());
     materials(&mut out, dress.textures, picture);
     for f in &twin.furniture {
-        furniture(&mut out, f, twin.density_kg_per_m3, dress);
+        furniture(&mut out, f, twin, dress);
     }
     let shown = dress.room.is_empty();
     if !(twin.room.is_empty() && shown) {
@@ -235,7 +233,8 @@ fn textured(out: &mut Usda, name: &str, file: &str) {
     out.close();
 }
 
-fn furniture(out: &mut Usda, f: &Furniture, density: f64, dress: &Dress) {
+fn furniture(out: &mut Usda, f: &Furniture, twin: &Twin, dress: &Dress) {
+    let density = twin.density_kg_per_m3;
     let part = &f.part;
     let phi = part.joint.articulation;
     let group = format!("{}_furniture", part.id);
@@ -260,12 +259,12 @@ fn furniture(out: &mut Usda, f: &Furniture, density: f64, dress: &Dress) {
     frames(out, &Vector::zeros(), &UnitQuaternion::identity());
     out.close();
 
-    joint(out, f, &path, &link);
+    joint(out, f, &path, &link, &twin.drives);
     out.close();
 }
 
 /// The joint of a part; `path` is its furniture's, `link` its body.
-fn joint(out: &mut Usda, f: &Furniture, path: &str, link: &str) {
+fn joint(out: &mut Usda, f: &Furniture, path: &str, link: &str, drives: &Drives) {
     let part = &f.part;
     let phi = part.joint.articulation;
     let (kind, drive) = match phi.kind {
@@ -285,7 +284,7 @@ fn joint(out: &mut Usda, f: &Furniture, path: &str, link: &str) {
         format!("string label = {}", quoted(&part.label)),
         format!("double observed = {}", part.joint.observed),
         format!("bool resistanceSeen = {}", u8::from(part.joint.resistance_seen)),
-        format!("double velocityLimit = {}", part.joint.velocity()),
+        format!("double velocityLimit = {}", part.joint.velocity(drives)),
     ]);
     let schemas = vec![apis(&[&format!("PhysicsDriveAPI:{drive}")])];
     out.open(&format!("{kind} \"{}\"", part.id), &[schemas, data].concat());
@@ -298,7 +297,7 @@ fn joint(out: &mut Usda, f: &Furniture, path: &str, link: &str) {
     out.line("float physics:lowerLimit = 0");
     out.line(&format!("float physics:upperLimit = {}", single(upper)));
     for (key, value) in
-        [("damping", damping), ("maxForce", part.joint.effort()), ("stiffness", 0.0), ("targetVelocity", 0.0)]
+        [("damping", damping), ("maxForce", part.joint.effort(drives)), ("stiffness", 0.0), ("targetVelocity", 0.0)]
     {
         out.line(&format!("float drive:{drive}:physics:{key} = {}", single(value)));
     }

@@ -553,6 +553,7 @@ mod tests {
         let twin = Twin {
             name: "t".to_owned(),
             density_kg_per_m3: 700.0,
+            drives: crate::config::Drives::default(),
             furniture: vec![door],
             room: vec![],
             left_out: vec![],

@@ -153,6 +153,7 @@ pub fn from_joints(file: &JointsFile, config: &config::Fitting, priors: &Priors)
     Ok(Twin {
         name: file.scene.clone(),
         density_kg_per_m3: priors.boards.density_kg_per_m3,
+        drives: priors.drives.clone(),
         furniture: placed.into_iter().map(|(_, f)| f).collect(),
         room: Vec::new(),
         left_out,

@@ -26,8 +26,6 @@ use crate::twin::{Furniture, OrientedBox, Part, Role, Solid};
 
 use super::overlap;
 
-/// The ends of an observed motion are known to about this: radians for hinges, metres for slides.
-const OBSERVED_NOISE: [f64; 2] = [0.09, 0.03];
 /// Format: least limit, rad or m; a joint has a range; a hinge of less looks like half a turn whose degrees were read as radians.
 const LEAST: [f64; 2] = [0.06, 0.01];
 /// Numerics: openings between two looks at what is in the way, rad or m.
@@ -47,8 +45,8 @@ pub(super) fn least(kind: JointKind) -> f64 {
 }
 
 /// How well the end of an observed motion is known, rad or m.
-pub(super) fn noise(kind: JointKind) -> f64 {
-    of(kind, OBSERVED_NOISE)
+pub(super) fn noise(kind: JointKind, config: &config::Fitting) -> f64 {
+    of(kind, config.observed_noise)
 }
 
 /// Whether a slide comes out of its face: a drawer, with a tray behind its front.
@@ -193,7 +191,7 @@ fn ahead(part: &Part, by: &Vector) -> Part {
 
 /// Sets each limit within what was observed: up to what stands in the way. `ranks[i]` is the place of piece `i` in the
 /// order of sureness, 0 first; assumed boards of less sure pieces give way. Returns the pieces whose part cannot move at all.
-pub(super) fn within_observed(furniture: &mut [Furniture], ranks: &[usize]) -> Vec<usize> {
+pub(super) fn within_observed(furniture: &mut [Furniture], ranks: &[usize], config: &config::Fitting) -> Vec<usize> {
     let mut stuck = Vec::new();
     let mut order: Vec<usize> = (0..furniture.len().min(ranks.len())).collect();
     order.sort_by_key(|&i| ranks[i]);
@@ -202,7 +200,7 @@ pub(super) fn within_observed(furniture: &mut [Furniture], ranks: &[usize]) -> V
         let kind = part.joint.articulation.kind;
         let seen = part.joint.upper;
         // At the very end of the motion it is the observation that may be wrong.
-        let sure = (seen - noise(kind)).max(0.0);
+        let sure = (seen - noise(kind, config)).max(0.0);
         let way = Way::of(&part, 0.0, sure);
         let in_the_way = |s: &Solid| s.role == Role::Carcass && !s.seen && way.free(&[s.shape]) < sure;
         for &j in order.iter().filter(|&&j| ranks[j] > ranks[i]) {
@@ -312,7 +310,7 @@ mod tests {
 
     fn limit(pieces: &mut [Furniture], room: &[Solid]) -> f64 {
         let ranks: Vec<usize> = (0..pieces.len()).collect();
-        within_observed(pieces, &ranks);
+        within_observed(pieces, &ranks, &config::Fitting::default());
         beyond_observed(pieces, room);
         pieces[0].part.joint.upper
     }

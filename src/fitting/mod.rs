@@ -99,7 +99,7 @@ pub fn fit_joints(
     // The room leaves free where parts were seen to go, and limits what nobody saw.
     limits::before_neighbours(&mut furniture, &priors.boards);
     // A part that its neighbours hold shut is wrong about where it is: it goes, and what it held is free.
-    while let Some(&worst) = limits::within_observed(&mut furniture, &ranks).iter().max_by_key(|&&i| ranks[i]) {
+    while let Some(&worst) = limits::within_observed(&mut furniture, &ranks, config).iter().max_by_key(|&&i| ranks[i]) {
         left_out.push(LeftOut {
             id: furniture[worst].part.id.clone(),
             reason: "surer furniture beside it would hold it shut".to_owned(),
@@ -126,6 +126,7 @@ pub fn fit_joints(
     Twin {
         name: scene.recording.clone(),
         density_kg_per_m3: priors.boards.density_kg_per_m3,
+        drives: priors.drives.clone(),
         furniture,
         room,
         left_out,

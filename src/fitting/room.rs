@@ -34,7 +34,7 @@ pub(super) fn boxes(cells: &RoomCells, furniture: &[Furniture], config: &config:
     let planes = flattened(&mut occupied, grid.edge, rules);
     let all: Vec<Index> = occupied.keys().copied().collect();
 
-    let swept: Vec<OrientedBox> = furniture.iter().flat_map(|f| sweep(&f.part)).collect();
+    let swept: Vec<OrientedBox> = furniture.iter().flat_map(|f| sweep(&f.part, config)).collect();
     let blockers: Vec<OrientedBox> = bodies.iter().chain(&swept).map(|b| grown(b, rules.margin_m)).collect();
     let taken = taken(&blockers, &occupied, &grid);
     occupied.retain(|index, _| !taken.contains(index));
@@ -201,7 +201,7 @@ pub fn body(piece: &Furniture) -> OrientedBox {
 /// The part's boxes (world, metres) wherever they are over the part's range, and as far beyond as a part may have been left by a
 /// hand whose motion was seen to end there; from one pose to the next nothing goes further than 2 cm.
 #[must_use]
-pub fn sweep(part: &Part) -> Vec<OrientedBox> {
+pub fn sweep(part: &Part, config: &config::Fitting) -> Vec<OrientedBox> {
     /// Geometry: from one pose of a part to the next no corner of it goes further, metres: half of it stays within the margin.
     const TRAVEL_M: f64 = 0.02;
     let phi = part.joint.articulation;
@@ -212,7 +212,7 @@ pub fn sweep(part: &Part) -> Vec<OrientedBox> {
             corners.map(|c| phi.line().distance(&c)).fold(0.05, f64::max)
         }
     };
-    limits::motions(part, 0.0, part.joint.upper + limits::noise(phi.kind), TRAVEL_M / lever)
+    limits::motions(part, 0.0, part.joint.upper + limits::noise(phi.kind, config), TRAVEL_M / lever)
         .iter()
         .flat_map(|(_, motion)| part.solids.iter().map(move |s| s.shape.moved(motion)))
         .collect()
@@ -467,7 +467,12 @@ mod tests {
         }
         // All that is seen away from the door is there.
         let grid = Grid { axes: room.axes, edge: EDGE };
-        let body = grid.bounds(sweep(&piece.part).iter().chain([&body(&piece)]).flat_map(OrientedBox::corners));
+        let body = grid.bounds(
+            sweep(&piece.part, &config::Fitting::default())
+                .iter()
+                .chain([&body(&piece)])
+                .flat_map(OrientedBox::corners),
+        );
         let (mut away, mut covered) = (0u32, 0usize);
         for cell in &room.cells {
             let middle = cell.extent.map(|[low, high]| 0.5 * (low + high));

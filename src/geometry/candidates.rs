@@ -74,21 +74,21 @@ pub struct AxisCandidate {
 impl AxisCandidate {
     /// A candidate of which no more is known than its joint and where it comes from.
     #[must_use]
-    pub fn new(joint: Articulation, source: AxisSource) -> Self {
-        let position_std_m = source.position_std_m();
+    pub fn new(joint: Articulation, source: AxisSource, sources: &config::AxisSources) -> Self {
+        let position_std_m = source.position_std_m(sources);
         Self { joint, source, side: None, views: 0, length_m: 0.0, position_std_m, shift: 0.0, named: 0.0 }
     }
 
     /// A hinge at a 3D line.
-    fn at_line(track: &LineTrack, direction: Vector, named: f64) -> Self {
+    fn at_line(track: &LineTrack, direction: Vector, named: f64, sources: &config::AxisSources) -> Self {
         let joint = Articulation { kind: JointKind::Revolute, axis: direction, origin: track.segment.middle() };
         let source = AxisSource::Line;
         Self {
             views: track.views.len(),
             length_m: track.segment.length(),
-            position_std_m: source.position_std_m().hypot(track.position_std_m()),
+            position_std_m: source.position_std_m(sources).hypot(track.position_std_m()),
             named,
-            ..Self::new(joint, source)
+            ..Self::new(joint, source, sources)
         }
     }
 }
@@ -96,17 +96,13 @@ impl AxisCandidate {
 impl AxisSource {
     /// How well the source places a hinge across its axis, metres.
     #[must_use]
-    pub fn position_std_m(self) -> f64 {
+    pub fn position_std_m(self, sources: &config::AxisSources) -> f64 {
         match self {
-            // A hinge is set back from the edge that one sees; what the line's own fit adds is its own.
-            Self::Line | Self::PlaneEdge => 0.02,
-            // Next to a hinge a door hardly moves, so the outline ends a few centimetres short of it.
-            Self::PartEdge => 0.06,
-            Self::FaceEdge => 0.08,
-            // Half of the way between two usual sizes.
-            Self::Assumed => 0.08,
-            // The fit itself.
-            _ => 0.2,
+            Self::Line | Self::PlaneEdge => sources.line_std_m,
+            Self::PartEdge => sources.part_edge_std_m,
+            Self::FaceEdge => sources.face_edge_std_m,
+            Self::Assumed => sources.assumed_std_m,
+            _ => sources.other_std_m,
         }
     }
 }
@@ -192,26 +188,26 @@ pub fn on_assumed(evidence: &Evidence, config: &config::Inference, fronts: &conf
         // The front's heading is off by some degrees, and its place by what handles stand off.
         if height.abs() <= config.at_face_m + snap.sin() * aside.abs() && aside.abs() >= config.min_radius_m {
             let side = Some(side_of(aside, upright));
-            out.push(AxisCandidate { side, ..AxisCandidate::at_line(track, direction, 0.0) });
+            out.push(AxisCandidate { side, ..AxisCandidate::at_line(track, direction, 0.0, &config.sources) });
         }
     }
     for &offset in &fronts.usual_levers_m {
         for (axis, offset) in [(0, -offset), (0, offset), (1, -offset), (1, offset)] {
-            out.push(edge(face, axis, offset, 0.0, 0.0, AxisSource::Assumed));
+            out.push(edge(face, axis, [offset, 0.0], 0.0, AxisSource::Assumed, &config.sources));
         }
     }
     for direction in [face.up, face.right] {
         if let Some(joint) = arc_about(evidence.path, &direction) {
             let side = Some(side_at(face, &direction, &joint.origin));
             let shift = implausibility(face, &joint, &config.arcs);
-            out.push(AxisCandidate { side, shift, ..AxisCandidate::new(joint, AxisSource::HandArc) });
+            out.push(AxisCandidate { side, shift, ..AxisCandidate::new(joint, AxisSource::HandArc, &config.sources) });
         }
     }
     let origin = evidence.path.first().copied().unwrap_or(evidence.grip);
     let own = [face.normal, face.right, face.up];
     for (axis, source) in own.into_iter().zip([AxisSource::FaceNormal, AxisSource::FaceAxis, AxisSource::FaceAxis]) {
         let joint = Articulation { kind: JointKind::Prismatic, axis, origin };
-        out.push(AxisCandidate::new(joint, source));
+        out.push(AxisCandidate::new(joint, source, &config.sources));
     }
     for candidate in &mut out {
         candidate.joint = outward(candidate.joint, face, &evidence.grip);
@@ -254,20 +250,20 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
             // A hinge lies at its face: deeper or nearer lines are the carcass, the floor, other furniture.
             if height.abs() <= config.at_face_m {
                 let side = Some(side_of(if upright { right } else { up }, upright));
-                out.push(AxisCandidate { side, ..AxisCandidate::at_line(track, direction, named(i)) });
+                out.push(AxisCandidate { side, ..AxisCandidate::at_line(track, direction, named(i), &config.sources) });
             }
         }
         let middles = evidence.rect.map_or([0.0; 2], middles);
         for (axis, offset, length_m) in plane_edges(face, evidence.surface, &config.plane_edges) {
-            out.push(edge(face, axis, offset, middles[1 - axis], length_m, AxisSource::PlaneEdge));
+            out.push(edge(face, axis, [offset, middles[1 - axis]], length_m, AxisSource::PlaneEdge, &config.sources));
         }
         if let Some(rect) = evidence.rect {
-            out.extend(edges(face, rect, AxisSource::PartEdge));
+            out.extend(edges(face, rect, AxisSource::PartEdge, &config.sources));
         }
-        out.extend(edges(face, &Rect { bounds: face.extent }, AxisSource::FaceEdge));
+        out.extend(edges(face, &Rect { bounds: face.extent }, AxisSource::FaceEdge, &config.sources));
     } else {
         let lines = evidence.tracks.iter().enumerate();
-        out.extend(lines.map(|(i, t)| AxisCandidate::at_line(t, t.segment.line.direction, named(i))));
+        out.extend(lines.map(|(i, t)| AxisCandidate::at_line(t, t.segment.line.direction, named(i), &config.sources)));
     }
     let directions: Vec<Vector> = match evidence.face {
         Some(face) => vec![face.up, face.right],
@@ -277,7 +273,7 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
         if let Some(joint) = arc_about(evidence.path, &direction) {
             let shift = evidence.face.map_or(0.0, |face| implausibility(face, &joint, &config.arcs));
             let side = evidence.face.map(|face| side_at(face, &direction, &joint.origin));
-            out.push(AxisCandidate { side, shift, ..AxisCandidate::new(joint, AxisSource::HandArc) });
+            out.push(AxisCandidate { side, shift, ..AxisCandidate::new(joint, AxisSource::HandArc, &config.sources) });
         }
     }
 }
@@ -285,11 +281,11 @@ fn hinges(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
 /// Hinges at the four sides of each outline that a part could have; sides next to each other are one. The sense moves the grip
 /// (world) out of the face.
 #[must_use]
-pub fn at_sides(face: &Face, outlines: &[Rect], grip: &Point) -> Vec<AxisCandidate> {
+pub fn at_sides(face: &Face, outlines: &[Rect], grip: &Point, sources: &config::AxisSources) -> Vec<AxisCandidate> {
     /// Geometry: sides that are nearer to each other are one, metres; less than an outline is known to.
     const ONE_M: f64 = 0.02;
     let mut out: Vec<AxisCandidate> = Vec::new();
-    for mut hinge in outlines.iter().flat_map(|rect| edges(face, rect, AxisSource::PartEdge)) {
+    for mut hinge in outlines.iter().flat_map(|rect| edges(face, rect, AxisSource::PartEdge, sources)) {
         hinge.joint = outward(hinge.joint, face, grip);
         let line = hinge.joint.line();
         if !out.iter().any(|other| other.side == hinge.side && line.distance(&other.joint.origin) < ONE_M) {
@@ -300,10 +296,15 @@ pub fn at_sides(face: &Face, outlines: &[Rect], grip: &Point) -> Vec<AxisCandida
 }
 
 /// Hinges at the four sides of a rectangle on a face.
-fn edges(face: &Face, rect: &Rect, source: AxisSource) -> impl Iterator<Item = AxisCandidate> {
+fn edges(
+    face: &Face,
+    rect: &Rect,
+    source: AxisSource,
+    sources: &config::AxisSources,
+) -> impl Iterator<Item = AxisCandidate> {
     let (bounds, middles, size) = (rect.bounds, middles(rect), rect.size());
     [0, 1].into_iter().flat_map(move |axis| {
-        bounds[axis].map(|offset| edge(face, axis, offset, middles[1 - axis], size[1 - axis], source))
+        bounds[axis].map(|offset| edge(face, axis, [offset, middles[1 - axis]], size[1 - axis], source, sources))
     })
 }
 
@@ -312,13 +313,20 @@ fn middles(rect: &Rect) -> [f64; 2] {
 }
 
 /// A hinge at an edge on a face: 0 = upright or 1 = level, its offset across and its middle along, its length, metres.
-fn edge(face: &Face, axis: usize, offset: f64, middle: f64, length_m: f64, source: AxisSource) -> AxisCandidate {
+fn edge(
+    face: &Face,
+    axis: usize,
+    [offset, middle]: [f64; 2],
+    length_m: f64,
+    source: AxisSource,
+    sources: &config::AxisSources,
+) -> AxisCandidate {
     let (axis, origin, upright) = match axis {
         0 => (face.up, face.point(offset, middle, 0.0), true),
         _ => (face.right, face.point(middle, offset, 0.0), false),
     };
     let joint = Articulation { kind: JointKind::Revolute, axis, origin };
-    AxisCandidate { side: Some(side_of(offset, upright)), length_m, ..AxisCandidate::new(joint, source) }
+    AxisCandidate { side: Some(side_of(offset, upright)), length_m, ..AxisCandidate::new(joint, source, sources) }
 }
 
 /// Where other sides of the furniture meet its face: (0 = upright edge or 1 = level one, its offset, the length seen), in face
@@ -400,7 +408,7 @@ fn slides(evidence: &Evidence, config: &config::Inference, out: &mut Vec<AxisCan
     let origin = evidence.path.first().copied().unwrap_or(evidence.grip);
     let mut push = |axis: Vector, source: AxisSource| {
         let joint = Articulation { kind: JointKind::Prismatic, axis, origin };
-        out.push(AxisCandidate::new(joint, source));
+        out.push(AxisCandidate::new(joint, source, &config.sources));
     };
     if let Some(face) = evidence.face.filter(|_| config.use_face_normal) {
         push(face.normal, AxisSource::FaceNormal);
@@ -455,7 +463,7 @@ mod tests {
         let face = face();
         // The second outline shares three sides with the first, up to less than outlines are known.
         let outlines = [Rect { bounds: [[-0.4, 0.1], [-0.2, 0.2]] }, Rect { bounds: [[-0.25, 0.11], [-0.2, 0.21]] }];
-        let found = at_sides(&face, &outlines, &face.center);
+        let found = at_sides(&face, &outlines, &face.center, &config::AxisSources::default());
         let sides: Vec<(HingeSide, f64)> = found
             .iter()
             .map(|c| {

@@ -2,6 +2,7 @@
 //! al., IPOL 2012), on an image that is smoothed as much as its noise asks for.
 
 use super::segment2::Segment2;
+use crate::config;
 use crate::recording::Grid;
 
 /// Definition (LSD): directions within this of each other belong together (LSD's 22.5 degrees), as a cosine.
@@ -12,15 +13,8 @@ const COS_TIGHT: f32 = 0.980_79;
 const CHANCE: f64 = 0.125;
 /// Definition (LSD): a rectangle less filled than this is no segment.
 const DENSITY: f64 = 0.7;
-/// Of an edge's profile the part above this share of its steepest place makes the region; the foot below it belongs to the
-/// edge too but blurs with its surroundings.
-const FOOT: f32 = 0.2;
 /// Format: fractional bits of the smoothed image.
 const BITS: u32 = 5;
-/// A gradient that no camera's quantisation makes, grey values a pixel.
-const LEAST_GRADIENT: f64 = 3.0;
-/// Gradients below this many standard deviations of the image's noise are not looked at.
-const NOISE_GATE: f64 = 4.0;
 
 /// Standard deviation of an image's pixel noise, grey values: from second differences along every eighth row. Edges are
 /// rare, so their median absolute value is the noise's.
@@ -49,22 +43,23 @@ pub fn noise_std(image: &Grid<u8>) -> f64 {
 }
 
 /// Smoothing for a noise level, pixels: the gradient's noise falls with its square, a thin line's gradient too but slower.
-fn smoothing(noise: f64) -> f64 {
+/// `least_gradient` in grey values a pixel.
+fn smoothing(noise: f64, least_gradient: f64) -> f64 {
     // Standard deviation of the gradient of Gaussian-smoothed white noise: noise / (sqrt(8 pi) sigma^2). It is brought
     // to a third of the least gradient; at least to what hides the steps of a slanted edge, at most to what keeps
     // neighbouring edges apart.
-    (noise / (8.0 * std::f64::consts::PI).sqrt() / (LEAST_GRADIENT / 3.0)).sqrt().clamp(1.0, 2.0)
+    (noise / (8.0 * std::f64::consts::PI).sqrt() / (least_gradient / 3.0)).sqrt().clamp(1.0, 2.0)
 }
 
 /// Segments at least `min_length` pixels long; integer coordinates are pixel centres.
 #[must_use]
-pub fn detect(image: &Grid<u8>, min_length: f64) -> Vec<Segment2> {
+pub fn detect(image: &Grid<u8>, min_length: f64, rules: &config::EdgeDetector) -> Vec<Segment2> {
     if image.width < 8 || image.height < 8 {
         return Vec::new();
     }
     let noise = noise_std(image);
-    let sigma = smoothing(noise);
-    let field = Field::new(image, sigma, noise);
+    let sigma = smoothing(noise, rules.least_gradient);
+    let field = Field::new(image, sigma, noise, rules);
     field.segments(min_length, sigma)
 }
 
@@ -134,16 +129,19 @@ struct Field {
     gy: Vec<i16>,
     /// Steep pixels, steepest first.
     order: Vec<u32>,
+    /// Share of its steepest gradient above which a pixel belongs to a region.
+    foot: f32,
 }
 
 impl Field {
-    fn new(image: &Grid<u8>, sigma: f64, noise: f64) -> Self {
+    fn new(image: &Grid<u8>, sigma: f64, noise: f64, rules: &config::EdgeDetector) -> Self {
         let (w, h) = (image.width, image.height);
         let smoothed = smooth(image, sigma);
         let gradient_noise = noise / (8.0 * std::f64::consts::PI).sqrt() / (sigma * sigma);
-        let least = LEAST_GRADIENT.max(NOISE_GATE * gradient_noise) * 2.0 * f64::from(1 << BITS);
+        let least = rules.least_gradient.max(rules.noise_stds * gradient_noise) * 2.0 * f64::from(1 << BITS);
         let least2 = (least * least) as i32;
-        let mut field = Self { width: w, height: h, gx: vec![0; w * h], gy: vec![0; w * h], order: Vec::new() };
+        let foot = rules.foot_share as f32;
+        let mut field = Self { width: w, height: h, gx: vec![0; w * h], gy: vec![0; w * h], order: Vec::new(), foot };
         let mut steep: Vec<(u32, i32)> = Vec::with_capacity(w * h / 8);
         let mut size2 = vec![0i32; w];
         for y in 1..h - 1 {
@@ -214,7 +212,7 @@ impl Field {
         used[seed as usize] = true;
         let [mut sx, mut sy] = self.vector(seed as usize);
         let limit = cosine * cosine;
-        let floor = FOOT * FOOT * (sx * sx + sy * sy);
+        let floor = self.foot * self.foot * (sx * sx + sy * sy);
         let mut next = 0;
         while next < region.len() {
             let i = region[next] as usize;
@@ -392,7 +390,7 @@ mod tests {
         for (noise, limit) in [(0.0, 0.1), (6.0, 0.33)] {
             for degrees in [3.0, 27.0, 45.0, 71.0, 90.0, 133.0] {
                 let angle = f64::to_radians(degrees);
-                let found = detect(&edge(angle, noise), 30.0);
+                let found = detect(&edge(angle, noise), 30.0, &config::EdgeDetector::default());
                 let best = found.iter().max_by(|a, b| a.length().total_cmp(&b.length())).unwrap();
                 let middle = [0, 1].map(|k| 0.5 * (best.a[k] + best.b[k]));
                 // The edge is where the value is half-way: at d = 0 of the clamped ramp.
@@ -413,14 +411,15 @@ mod tests {
             let image = Grid { width: 320, height: 240, data };
             let measured = noise_std(&image);
             assert!((measured - std).abs() < 0.2 * std + 0.2, "{std}: {measured}");
-            let found = detect(&image, 12.0);
+            let found = detect(&image, 12.0, &config::EdgeDetector::default());
             assert!(found.len() <= 1, "{std}: {found:?}");
         }
     }
 
     #[test]
     fn a_tiny_or_empty_image_has_no_segments() {
-        assert!(detect(&Grid::filled(3, 3, 9u8), 5.0).is_empty());
-        assert!(detect(&Grid::filled(64, 64, 9u8), 5.0).is_empty());
+        let rules = config::EdgeDetector::default();
+        assert!(detect(&Grid::filled(3, 3, 9u8), 5.0, &rules).is_empty());
+        assert!(detect(&Grid::filled(64, 64, 9u8), 5.0, &rules).is_empty());
     }
 }

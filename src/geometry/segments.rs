@@ -11,8 +11,8 @@ use crate::recording::{Grid, HAND_CLASS, Recording};
 
 /// Whatever finds line segments in a grey image.
 pub trait LineDetector: Sync {
-    /// Segments of at least a length, pixels; integer coordinates are pixel centres.
-    fn detect(&self, image: &Grid<u8>, min_length_px: f64) -> Vec<Segment2>;
+    /// Segments of at least a length, pixels; integer coordinates are pixel centres. The rules are the built-in detector's.
+    fn detect(&self, image: &Grid<u8>, min_length_px: f64, rules: &config::EdgeDetector) -> Vec<Segment2>;
 }
 
 /// The built-in detector ([`detector`]).
@@ -20,8 +20,8 @@ pub trait LineDetector: Sync {
 pub struct Lsd;
 
 impl LineDetector for Lsd {
-    fn detect(&self, image: &Grid<u8>, min_length_px: f64) -> Vec<Segment2> {
-        detector::detect(image, min_length_px)
+    fn detect(&self, image: &Grid<u8>, min_length_px: f64, rules: &config::EdgeDetector) -> Vec<Segment2> {
+        detector::detect(image, min_length_px, rules)
     }
 }
 
@@ -107,7 +107,7 @@ fn in_image(
     let mut found: Vec<Segment2> = match recording.segments(frame)? {
         Some(ends) => ends.into_iter().map(|[a, b]| Segment2 { a, b }).collect(),
         None => match recording.grey(frame)? {
-            Some(grey) => detector.detect(&grey, config.min_segment_px),
+            Some(grey) => detector.detect(&grey, config.min_segment_px, &config.detector),
             None => Vec::new(),
         },
     };
@@ -330,7 +330,7 @@ mod tests {
                 image.data[y * 120 + x] = 200;
             }
         }
-        let long = Lsd.detect(&image, 30.0);
+        let long = Lsd.detect(&image, 30.0, &config::EdgeDetector::default());
         assert_eq!(long.len(), 4, "{long:?}");
     }
 }

@@ -45,11 +45,28 @@ pub struct Trajectory {
     pub ends_seen: [bool; 2],
 }
 
-/// Standard deviation along the motion, metres, of a grip where the hand was seen to take hold or let go, and where it was
-/// lost on the way: about a third of what a drawer or the handle of a door travels.
+/// Standard deviation along the motion, metres, of a grip where the hand was seen to take hold or let go, or where it was lost on
+/// the way.
 #[must_use]
-pub fn grip_std_m(end_seen: bool) -> f64 {
-    if end_seen { 0.03 } else { 0.12 }
+pub fn grip_std_m(end_seen: bool, rules: &config::Grips) -> f64 {
+    if end_seen { rules.seen_std_m } else { rules.lost_std_m }
+}
+
+/// How well a hand tells where its grip is along the motion: standard deviations, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GripStd {
+    /// Of the grip at the closed end.
+    pub closed_m: f64,
+    /// Of a grip where the hand was lost on the way.
+    pub lost_m: f64,
+}
+
+impl GripStd {
+    /// Of a hand.
+    #[must_use]
+    pub fn of(hand: &Trajectory, rules: &config::Grips) -> Self {
+        Self { closed_m: grip_std_m(hand.closed_end_seen(), rules), lost_m: grip_std_m(false, rules) }
+    }
 }
 
 fn both_seen() -> [bool; 2] {

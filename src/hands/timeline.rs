@@ -2,10 +2,8 @@
 
 use super::Trajectory;
 use crate::articulation::Action;
+use crate::config;
 use crate::recording::{Clip, Recording};
-
-/// Contact flags begin late and end early by a fraction of a second.
-const AROUND_SECS: f64 = 0.3;
 
 /// Where a part is in a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,13 +61,13 @@ pub struct Timeline {
 impl Timeline {
     /// Of a part's motions, in any order; a part that never moves is closed.
     #[must_use]
-    pub fn of(recording: &Recording, motions: &[Motion]) -> Self {
+    pub fn of(recording: &Recording, motions: &[Motion], config: &config::Hands) -> Self {
         let time = |frame: usize| {
             recording.frames.get(frame).or(recording.frames.last()).map_or(0.0, |frame| frame.timestamp_secs)
         };
         let event = |m: &Motion| Event {
-            from: time(m.frames[0]) - AROUND_SECS,
-            to: time(m.frames[1]) + AROUND_SECS,
+            from: time(m.frames[0]) - config.moves_around_secs,
+            to: time(m.frames[1]) + config.moves_around_secs,
             opens: m.opens,
             opening: m.opening,
         };

@@ -270,7 +270,8 @@ mod tests {
 
     fn candidate(kind: JointKind, x: f64) -> AxisCandidate {
         let axis = if kind == JointKind::Revolute { Vector::z() } else { -Vector::y() };
-        AxisCandidate::new(Articulation { kind, axis, origin: Point::new(x, 0.0, 0.0) }, AxisSource::Line)
+        let joint = Articulation { kind, axis, origin: Point::new(x, 0.0, 0.0) };
+        AxisCandidate::new(joint, AxisSource::Line, &config::AxisSources::default())
     }
 
     #[test]

@@ -229,7 +229,7 @@ mod tests {
     }
 
     fn candidate(kind: JointKind, axis: Vector, origin: Point, source: AxisSource) -> AxisCandidate {
-        AxisCandidate::new(Articulation { kind, axis, origin }, source)
+        AxisCandidate::new(Articulation { kind, axis, origin }, source, &config::AxisSources::default())
     }
 
     /// A hand on a door of 50 cm about the z axis.

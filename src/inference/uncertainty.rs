@@ -24,7 +24,7 @@ use super::{ClipJoint, ENDS, openings};
 use crate::articulation::{Articulation, JointKind};
 use crate::config;
 use crate::geometry::{AxisCandidate, AxisSource, Face};
-use crate::hands::{self, Trajectory};
+use crate::hands::{GripStd, Trajectory};
 use crate::math::{Point, Vector, any_orthogonal, reject, rotation, stats, unit};
 
 /// A covariance over two directions across an axis, by rows.
@@ -144,14 +144,19 @@ pub struct Evidence<'a> {
 
 /// The candidate that a clip's joint was; where it is none of them, what is known of its source.
 #[must_use]
-pub fn chosen(joint: &ClipJoint, candidates: &[AxisCandidate]) -> AxisCandidate {
+pub fn chosen(joint: &ClipJoint, candidates: &[AxisCandidate], sources: &config::AxisSources) -> AxisCandidate {
     let same = |c: &&AxisCandidate| c.source == joint.source && c.joint.origin == joint.joint.origin;
-    candidates.iter().find(same).cloned().unwrap_or_else(|| AxisCandidate::new(joint.joint, joint.source))
+    candidates.iter().find(same).cloned().unwrap_or_else(|| AxisCandidate::new(joint.joint, joint.source, sources))
 }
 
 /// How sure a joint is; `None` without a hand, and where a number is lost to rounding.
 #[must_use]
-pub fn of(evidence: &Evidence, reasoning: &config::Reasoning, part: &config::Part) -> Option<Uncertainty> {
+pub fn of(
+    evidence: &Evidence,
+    reasoning: &config::Reasoning,
+    part: &config::Part,
+    grips: &config::Grips,
+) -> Option<Uncertainty> {
     let Evidence { joint, chosen, hands, depth, .. } = *evidence;
     let across = across(&joint.axis, evidence.face);
     let paths: Vec<Vec<Point>> = hands.iter().filter(|_| evidence.settled).map(|hand| hand.positions()).collect();
@@ -172,7 +177,7 @@ pub fn of(evidence: &Evidence, reasoning: &config::Reasoning, part: &config::Par
         .map(|(i, hand)| {
             let seen = depth.and_then(|d| d.moved_std.get(i).copied());
             seen.filter(|std| std.is_finite() && *std > 0.0)
-                .unwrap_or_else(|| hand_range_std(joint, hand, &across, origin.as_ref(), part.least_lever_m))
+                .unwrap_or_else(|| hand_range_std(joint, hand, &across, origin.as_ref(), part.least_lever_m, grips))
         })
         .collect();
     let largest = evidence.moved.iter().zip(&moved_std).max_by(|a, b| a.0.total_cmp(b.0));
@@ -344,10 +349,11 @@ fn hand_range_std(
     across: &[Vector; 2],
     origin: Option<&Matrix2<f64>>,
     least_lever_m: f64,
+    grips: &config::Grips,
 ) -> f64 {
     let [closed, open] = [hand.closed_grip(), hand.open_grip()];
-    let closed_m = hands::grip_std_m(hand.closed_end_seen());
-    let grip_m = if hand.open_end_seen() { closed_m } else { closed_m.hypot(hands::grip_std_m(false)) };
+    let GripStd { closed_m, lost_m } = GripStd::of(hand, grips);
+    let grip_m = if hand.open_end_seen() { closed_m } else { closed_m.hypot(lost_m) };
     let by_grip = grip_m / joint.lever(&closed).max(least_lever_m);
     let by_hinge = origin.map_or(0.0, |covariance| {
         // How the direction from the hinge to a grip turns when the hinge moves.
@@ -404,6 +410,16 @@ mod tests {
         Trajectory { side: None, samples, action: Action::Open, ends_seen: [true, open_end_seen] }
     }
 
+    fn candidate(joint: &Articulation, source: AxisSource) -> AxisCandidate {
+        AxisCandidate::new(*joint, source, &config::AxisSources::default())
+    }
+
+    /// Under the default config.
+    fn told(evidence: &Evidence) -> Option<Uncertainty> {
+        let (reasoning, part) = (config::Reasoning::default(), config::Part::default());
+        of(evidence, &reasoning, &part, &config::Grips::default())
+    }
+
     fn known(
         joint: &Articulation,
         source: AxisSource,
@@ -412,10 +428,10 @@ mod tests {
     ) -> Uncertainty {
         let moved: Vec<f64> =
             hands.iter().map(|h| super::super::observed_range(joint, &h.closed_grip(), &h.positions())).collect();
-        let (chosen, face) = (AxisCandidate::new(*joint, source), face());
+        let (chosen, face) = (candidate(joint, source), face());
         let evidence =
             Evidence { joint, chosen: &chosen, face: Some(&face), hands, settled: true, moved: &moved, depth };
-        of(&evidence, &config::Reasoning::default(), &config::Part::default()).unwrap()
+        told(&evidence).unwrap()
     }
 
     #[test]
@@ -459,7 +475,7 @@ mod tests {
     fn a_wide_arc_places_a_hinge_better_than_its_source_and_a_second_clip_better_still() {
         let (short, wide) = (hand(&door(), 0.1, true), hand(&door(), 1.6, true));
         let hinge = |hands: &[&Trajectory]| known(&door(), AxisSource::HandArc, hands, None).origin_cov_m2.unwrap();
-        let prior = AxisSource::HandArc.position_std_m().powi(2);
+        let prior = AxisSource::HandArc.position_std_m(&config::AxisSources::default()).powi(2);
         let [none, one, two] = [hinge(&[&short]), hinge(&[&wide]), hinge(&[&wide, &wide])];
         assert!(none[0][0] > 0.4 * prior && none[1][1] > 0.9 * prior, "{none:?}");
         for k in 0..2 {
@@ -485,7 +501,7 @@ mod tests {
         let drawer = Articulation { kind: JointKind::Prismatic, axis: -Vector::y(), origin: Point::origin() };
         let assumed = Face { support: 0.0, ..face() };
         let axis_std = |joint: &Articulation, source: AxisSource, travel: f64| {
-            let (chosen, hand) = (AxisCandidate::new(*joint, source), hand(joint, travel, true));
+            let (chosen, hand) = (candidate(joint, source), hand(joint, travel, true));
             let moved = [travel];
             let evidence = Evidence {
                 joint,
@@ -496,8 +512,7 @@ mod tests {
                 moved: &moved,
                 depth: None,
             };
-            let covariance =
-                of(&evidence, &config::Reasoning::default(), &config::Part::default()).unwrap().axis_cov_rad2;
+            let covariance = told(&evidence).unwrap().axis_cov_rad2;
             [covariance[0][0].sqrt(), covariance[1][1].sqrt()]
         };
         let largest = |[a, b]: [f64; 2]| a.max(b);
@@ -528,10 +543,10 @@ mod tests {
         let std =
             |seen: bool| known(&door(), AxisSource::PlaneEdge, &[&hand(&door(), 1.0, seen)], None).observed_range_std;
         assert!(std(true) >= 0.06 && std(false) > 2.0 * std(true), "{} {}", std(true), std(false));
-        let (joint, chosen) = (door(), AxisCandidate::new(door(), AxisSource::Line));
+        let (joint, chosen) = (door(), candidate(&door(), AxisSource::Line));
         let nobody =
             Evidence { joint: &joint, chosen: &chosen, face: None, hands: &[], settled: true, moved: &[], depth: None };
-        assert_eq!(of(&nobody, &config::Reasoning::default(), &config::Part::default()), None);
+        assert_eq!(told(&nobody), None);
     }
 
     #[test]

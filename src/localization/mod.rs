@@ -66,6 +66,7 @@ pub fn localize(
     trajectory: &Trajectory,
     frames: &[usize],
     config: &config::Localization,
+    grips: &config::Grips,
 ) -> Outcome<Region> {
     let Footage { recording, sketches, .. } = *footage;
     let grip = trajectory.closed_grip();
@@ -87,7 +88,7 @@ pub fn localize(
     // A grip stands off its face by a handle, and hands are estimated to a few centimetres. One that was first seen on the way
     // is as far from where it took hold as it is uncertain; frames of the interaction itself show the part where the hand is.
     let held = trajectory.closed_end_seen() || !config.closed_state_frames;
-    let near_m = if held { config.near_m } else { config.near_m + 2.0 * grip_std_m(false) };
+    let near_m = if held { config.near_m } else { config.near_m + 2.0 * grip_std_m(false, grips) };
     // Fewer views than asked for where nothing reaches them: a coarse region is better than none, and it says so.
     for min_views in (1..=config.min_views).rev() {
         let confident: Vec<[i32; 3]> =

@@ -35,6 +35,7 @@ pub fn to_ruled_twin(model: &Model) -> (Twin, ContactRules, Vec<String>) {
     let mut twin = Twin {
         name: model.name.chars().filter(|c| !c.is_control()).collect(),
         density_kg_per_m3: DENSITY,
+        drives: crate::config::Drives::default(),
         furniture: Vec::new(),
         room: Vec::new(),
         left_out: Vec::new(),

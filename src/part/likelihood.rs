@@ -13,6 +13,7 @@ use super::views::{Hold, View};
 use crate::articulation::{Articulation, JointKind};
 use crate::config;
 use crate::geometry::{Face, Rect};
+use crate::hands::GripStd;
 use crate::math::Point;
 use crate::math::stats::log_sum;
 
@@ -36,12 +37,12 @@ impl<'a> OpenDepth<'a> {
     }
 
     /// The rays' word: all offsets count, each as far as it is believed in.
-    fn by_rays(&self, joint: &Articulation, grip: &Point, grip_std_m: f64) -> f64 {
+    fn by_rays(&self, joint: &Articulation, grip: &Point, std: GripStd) -> f64 {
         let (rays, most_nats) = (&self.rays, self.config.likelihood.rays_most_nats);
         let lever = joint.lever(grip).max(self.config.likelihood.least_lever_m);
         // Where a hand was lost before it let go, the views after that have an offset of their own.
         let of = |holds: &[Hold]| -> f64 {
-            let (priors, together): (Vec<f64>, Vec<f64>) = offsets(holds, |h| rays.has(&[h]), grip_std_m, self.config)
+            let (priors, together): (Vec<f64>, Vec<f64>) = offsets(holds, |h| rays.has(&[h]), std, self.config)
                 .into_iter()
                 .map(|(offset, prior)| (prior, prior + rays.log_likelihood(joint, grip, holds, offset / lever)))
                 .unzip();
@@ -55,14 +56,14 @@ impl<'a> OpenDepth<'a> {
     /// seen through there (but edge-on), and no longer where they were; and the number of such sights.
     ///
     /// Of all offsets (see [`log_likelihood`]) the one that explains most is taken, less what so large an offset is believed in.
-    fn by_points(&self, joint: &Articulation, grip: &Point, grip_std_m: f64) -> (f64, usize) {
+    fn by_points(&self, joint: &Articulation, grip: &Point, std: GripStd) -> (f64, usize) {
         let (points, rules) = (&self.points, &self.config.likelihood);
         let share_per_nat = 1.0 / rules.whole_share_nats;
         let has = |h: Hold| points.views.iter().any(|v| v.hold == h);
         let lever = joint.lever(grip).max(rules.least_lever_m);
         // Where a hand was lost before it let go, the views after that have an offset of their own.
         let of = |holds: &[Hold]| -> (f64, usize) {
-            let found = offsets(holds, has, grip_std_m, self.config).into_iter().map(|(offset, prior)| {
+            let found = offsets(holds, has, std, self.config).into_iter().map(|(offset, prior)| {
                 let (share, count) = points::seen_share(points, joint, grip, holds, offset / lever);
                 ((share + share_per_nat * prior).max(0.0), count)
             });
@@ -87,13 +88,12 @@ impl<'a> OpenDepth<'a> {
 /// this joint's against that nothing moved. Only differences between joints mean something.
 ///
 /// Hands and depth disagree by a few centimetres that stay the same over a clip (a hand's distance is the least certain thing
-/// about it): the opening that the hand tells has an offset of its own, of which `grip_std_m` is the spread along the motion,
-/// metres.
+/// about it): the opening that the hand tells has an offset of its own, of which `std` is the spread along the motion.
 #[must_use]
-pub fn log_likelihood(depth: &OpenDepth, joint: &Articulation, grip: &Point, grip_std_m: f64) -> f64 {
+pub fn log_likelihood(depth: &OpenDepth, joint: &Articulation, grip: &Point, std: GripStd) -> f64 {
     let rules = &depth.config.likelihood;
-    rules.points_weight * depth.points.log_likelihood(depth.by_points(joint, grip, grip_std_m))
-        + rules.rays_weight * depth.by_rays(joint, grip, grip_std_m)
+    rules.points_weight * depth.points.log_likelihood(depth.by_points(joint, grip, std))
+        + rules.rays_weight * depth.by_rays(joint, grip, std)
 }
 
 /// [`log_likelihood`] of each joint: joints that are the same to what depth can tell are asked about once.
@@ -102,14 +102,14 @@ pub fn log_likelihoods<'j>(
     depth: &OpenDepth,
     joints: impl Iterator<Item = &'j Articulation>,
     grip: &Point,
-    grip_std_m: f64,
+    std: GripStd,
 ) -> Vec<f64> {
     let mut known: Vec<(&Articulation, f64)> = Vec::new();
     joints
         .map(|joint| match known.iter().find(|(other, _)| all_but_same(joint, other, &depth.config.likelihood)) {
             Some((_, nats)) => *nats,
             None => {
-                let nats = log_likelihood(depth, joint, grip, grip_std_m);
+                let nats = log_likelihood(depth, joint, grip, std);
                 known.push((joint, nats));
                 nats
             }
@@ -127,8 +127,8 @@ fn all_but_same(a: &Articulation, b: &Articulation, rules: &config::JointOdds) -
 /// Offsets of the opening at the grip that views of these sorts may share, metres, from the middle outwards, each with the log of
 /// how far it is believed in against none. Their spread is that of the surest sort that there is: views after a hand let go
 /// are held to the offset of those before.
-fn offsets(together: &[Hold], has: impl Fn(Hold) -> bool, grip_std_m: f64, config: &config::Part) -> Vec<(f64, f64)> {
-    let of = |h: &Hold| has(*h).then(|| h.std_m(grip_std_m, &config.views));
+fn offsets(together: &[Hold], has: impl Fn(Hold) -> bool, std: GripStd, config: &config::Part) -> Vec<(f64, f64)> {
+    let of = |h: &Hold| has(*h).then(|| h.std_m(std, &config.views));
     let std_m = together.iter().filter_map(of).fold(f64::INFINITY, f64::min);
     let step = config.likelihood.step_m.max(0.5 * std_m);
     let reach = (config.likelihood.reach_stds * std_m / step).round() as i32;
@@ -143,7 +143,7 @@ mod tests {
     use crate::geometry::Rect;
     use crate::math::Vector;
 
-    const GRIP_STD_M: f64 = 0.03;
+    const GRIP_STD: GripStd = GripStd { closed_m: 0.03, lost_m: 0.12 };
     /// Of the 81 points in one view.
     const LEAST_SIGHTS: usize = 56;
 
@@ -176,7 +176,7 @@ mod tests {
     fn a_joint_explains_its_own_motion_and_a_slide_within_the_face_must_uncover_something() {
         let (out, aside) = (slide(-Vector::y()), slide(-Vector::x()));
         let share = |moves: &Articulation, opening: f64, told: f64, claims: &Articulation| {
-            ask(moves, opening, told, Some(&drawn::rect()), |s, grip| s.by_points(claims, grip, GRIP_STD_M))
+            ask(moves, opening, told, Some(&drawn::rect()), |s, grip| s.by_points(claims, grip, GRIP_STD))
         };
         // Whoever claims the motion that was made explains nearly all.
         for (joint, opening) in [(door(), 0.9), (out, 0.3), (aside, 0.3)] {
@@ -197,9 +197,10 @@ mod tests {
         let edge_on = 1.0f64.atan2(0.55);
         let (face, grip, rect) = (drawn::face(), drawn::face().center, drawn::rect());
         let sketch = drawn::sketch(&pose, &door(), edge_on);
+        let std = GripStd { closed_m: 0.001, ..GRIP_STD };
         let told = |opening: f64| {
             let views = [drawn::view(&sketch, &pose, door().motion(opening) * grip)];
-            OpenDepth::of(&face, Some(&rect), &views, &drawn::CONFIG).by_points(&door(), &grip, 0.001)
+            OpenDepth::of(&face, Some(&rect), &views, &drawn::CONFIG).by_points(&door(), &grip, std)
         };
         let ((right, all), (off, rest)) = (told(edge_on), told(edge_on - 0.1));
         assert!(right > 0.95 && off > 0.95, "{right} {off}");
@@ -217,7 +218,7 @@ mod tests {
         for outline in [Some(&rect), None] {
             for (moves, opening) in &joints {
                 let found = joints.map(|(claims, _)| {
-                    ask(moves, *opening, *opening, outline, |s, grip| s.by_rays(&claims, grip, GRIP_STD_M))
+                    ask(moves, *opening, *opening, outline, |s, grip| s.by_rays(&claims, grip, GRIP_STD))
                 });
                 let best = (0..3).max_by(|&a, &b| found[a].total_cmp(&found[b])).unwrap();
                 assert!(joints[best].0 == *moves && found[best] > 1.0, "{outline:?} {moves:?} {found:?}");
@@ -229,7 +230,7 @@ mod tests {
     fn rays_tell_a_short_pull_from_a_slide_that_stays_in_the_front() {
         // Seven centimetres are less than depth at a metre needs to call a point moved.
         let (out, aside) = (slide(-Vector::y()), slide(-Vector::x()));
-        let of = |claims: &Articulation| ask(&out, 0.07, 0.07, None, |s, grip| s.by_rays(claims, grip, GRIP_STD_M));
+        let of = |claims: &Articulation| ask(&out, 0.07, 0.07, None, |s, grip| s.by_rays(claims, grip, GRIP_STD));
         assert!(of(&out) > of(&aside) + 1.0, "{} {}", of(&out), of(&aside));
     }
 
@@ -237,7 +238,7 @@ mod tests {
     fn a_front_that_stayed_shut_speaks_against_all_motions() {
         for joint in [door(), slide(-Vector::y()), slide(-Vector::x())] {
             let told = if joint.kind == JointKind::Revolute { 0.9 } else { 0.3 };
-            let found = ask(&joint, 0.0, told, Some(&drawn::rect()), |s, grip| s.by_rays(&joint, grip, GRIP_STD_M));
+            let found = ask(&joint, 0.0, told, Some(&drawn::rect()), |s, grip| s.by_rays(&joint, grip, GRIP_STD));
             // Most of what a slide within the front covers is covered by the front that stayed.
             let leaves = joint.axis.x.abs() < 0.5;
             assert!(found < if leaves { -1.0 } else { 0.0 }, "{joint:?} {found}");
@@ -252,7 +253,7 @@ mod tests {
         let nats = |points_weight: f64, rays_weight: f64| {
             let likelihood = config::JointOdds { points_weight, rays_weight, ..Default::default() };
             let config = config::Part { likelihood, ..Default::default() };
-            log_likelihood(&OpenDepth::of(&face, Some(&rect), &views, &config), &door(), &face.center, GRIP_STD_M)
+            log_likelihood(&OpenDepth::of(&face, Some(&rect), &views, &config), &door(), &face.center, GRIP_STD)
         };
         let [points, rays, usual] = [nats(1.0, 0.0), nats(0.0, 1.0), nats(0.75, 0.5)];
         assert!(points != 0.0 && rays != 0.0 && (0.75 * points + 0.5 * rays - usual).abs() < 1e-9, "{points} {rays}");
@@ -264,8 +265,8 @@ mod tests {
         let hinge = Articulation { origin: door().origin + Vector::x() * 0.001, ..door() };
         let asked = [out, door(), near, hinge, slide(-Vector::x())];
         let rect = drawn::rect();
-        let found = ask(&out, 0.3, 0.3, Some(&rect), |s, grip| log_likelihoods(s, asked.iter(), grip, GRIP_STD_M));
-        let alone = asked.map(|j| ask(&out, 0.3, 0.3, Some(&rect), |s, grip| log_likelihood(s, &j, grip, GRIP_STD_M)));
+        let found = ask(&out, 0.3, 0.3, Some(&rect), |s, grip| log_likelihoods(s, asked.iter(), grip, GRIP_STD));
+        let alone = asked.map(|j| ask(&out, 0.3, 0.3, Some(&rect), |s, grip| log_likelihood(s, &j, grip, GRIP_STD)));
         assert_eq!([found[0], found[1], found[4]], [alone[0], alone[1], alone[4]]);
         assert_eq!([found[2], found[3]], [found[0], found[1]]);
         assert!(found[0] > found[1] && found[0] > found[4]);

@@ -14,6 +14,7 @@ use crate::config;
 use crate::geometry::Face;
 use crate::geometry::Rect;
 use crate::geometry::candidates::within_front;
+use crate::hands::GripStd;
 use crate::math::{Point, Pose, Vector, any_orthogonal, reject, stats, unit};
 
 /// The views of one clip's open state, with the grip when closed as that clip's hand has it.
@@ -21,8 +22,8 @@ use crate::math::{Point, Pose, Vector, any_orthogonal, reject, stats, unit};
 pub struct OpenState<'a> {
     /// World.
     pub grip: Point,
-    /// Standard deviation of the grip along the motion, metres.
-    pub grip_std_m: f64,
+    /// How well the hand tells the grip.
+    pub grip_std: GripStd,
     /// See [`super::views::open_views`].
     pub views: &'a [View<'a>],
     /// Views of the closed state.
@@ -145,7 +146,7 @@ fn seen<'a>(face: &Face, joint: &Articulation, clips: &[OpenState<'a>], config: 
     let of_view = |clip: &OpenState<'a>, view: &'a View<'a>| Seen {
         view,
         hand: joint.opening_at(&clip.grip, &view.grip),
-        std: view.hold.std_m(clip.grip_std_m, &config.views) / lever(joint, clip, config),
+        std: view.hold.std_m(clip.grip_std, &config.views) / lever(joint, clip, config),
         closed: if within_front(joint, &face.normal) { &[] } else { clip.closed },
     };
     clips.iter().map(|clip| clip.views.iter().map(|view| of_view(clip, view)).collect()).collect()
@@ -465,6 +466,7 @@ mod tests {
     use super::super::views::drawn;
     use super::*;
 
+    const GRIP_STD: GripStd = GripStd { closed_m: 0.03, lost_m: 0.12 };
     const PRIOR: Prior = Prior { hinge_m: 0.03, board_m: 0.018 };
 
     fn door() -> Articulation {
@@ -521,7 +523,7 @@ mod tests {
         let mut view = drawn::view(&sketch, &pose, believed.motion(told) * grip);
         view.noise = drawn::exact_noise();
         let views = [view];
-        let clips = [OpenState { grip, grip_std_m: 0.03, views: &views, closed: &[] }];
+        let clips = [OpenState { grip, grip_std: GRIP_STD, views: &views, closed: &[] }];
         refit(&drawn::face(), &drawn::rect(), believed, &clips, &PRIOR, &drawn::CONFIG)
     }
 
@@ -549,7 +551,7 @@ mod tests {
             // Further off than an offset of the hand is looked for.
             let mut view = drawn::view(&open, &pose, door().motion(0.05) * grip);
             view.hold = Hold::Free;
-            let clips = [OpenState { grip, grip_std_m: 0.03, views: &[view], closed }];
+            let clips = [OpenState { grip, grip_std: GRIP_STD, views: &[view], closed }];
             refit(&drawn::face(), &drawn::rect(), &door(), &clips, &PRIOR, &drawn::CONFIG).map(|fit| fit.openings[0][0])
         };
         let found = stands(&[drawn::view(&shut, &pose, grip)]).unwrap();

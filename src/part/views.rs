@@ -7,7 +7,7 @@ use nalgebra::Matrix3;
 use super::pixel::Noise;
 use crate::articulation::{Action, Articulation};
 use crate::config;
-use crate::hands::Trajectory;
+use crate::hands::{GripStd, Trajectory};
 use crate::math::{Point, Pose, Vector};
 use crate::recording::sketch::Sketch;
 use crate::recording::{Camera, Clip, Recording};
@@ -50,15 +50,15 @@ impl Hold {
     /// All of them.
     pub(super) const ALL: [Self; 4] = [Self::Sure, Self::Free, Self::Lost, Self::Left];
 
-    /// What a grip of `grip_std_m` is worth in such a view, metres.
-    pub(super) fn std_m(self, grip_std_m: f64, config: &config::OpenViews) -> f64 {
+    /// What a grip is worth in such a view: a standard deviation, metres.
+    pub(super) fn std_m(self, grip: GripStd, config: &config::OpenViews) -> f64 {
         let after = match self {
             Self::Sure => 0.0,
             // Contact flags are wrong now and then.
-            Self::Free => config.free_share * crate::hands::grip_std_m(false),
-            Self::Lost | Self::Left => crate::hands::grip_std_m(false),
+            Self::Free => config.free_share * grip.lost_m,
+            Self::Lost | Self::Left => grip.lost_m,
         };
-        grip_std_m.hypot(after)
+        grip.closed_m.hypot(after)
     }
 }
 

@@ -87,7 +87,8 @@ pub(super) fn locate(
             return located;
         }
     };
-    match localization::localize(footage, clip, &trajectory, &located.closed, &config.localization) {
+    match localization::localize(footage, clip, &trajectory, &located.closed, &config.localization, &config.hands.grips)
+    {
         Outcome::Found(region) => {
             located.views = views::reselect(footage.recording, idle, &region, occupancy, &config.localization);
             located.region = Some(region);
@@ -200,7 +201,7 @@ fn answered(
     config: &Config,
 ) -> Option<Answer> {
     let (trajectory, region) = (result.trajectory.as_ref()?, result.region.as_ref()?);
-    let grip_std_m = hands::grip_std_m(trajectory.closed_end_seen());
+    let grip_std_m = hands::grip_std_m(trajectory.closed_end_seen(), &config.hands.grips);
     let closed = result.face.map(|face| weigh::ClosedFront { face, rect: result.part, grip: region.grip, grip_std_m });
     let shown = weigh::ClipEvidence {
         reading: reading.clone(),

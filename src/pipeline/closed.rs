@@ -1,7 +1,7 @@
 //! Which of a part's clips saw it closed best: the one that gives its front (ours).
 
 use super::{ClipResult, method};
-use crate::config::{ClosedFronts, Config};
+use crate::config::{ClosedFronts, Config, Grips};
 use crate::geometry::Face;
 use crate::hands;
 use crate::math::{Point, signed_angle};
@@ -24,8 +24,8 @@ impl Grip {
     }
 
     /// Standard deviation along the motion, metres.
-    pub(super) fn std_m(&self) -> f64 {
-        hands::grip_std_m(self.seen)
+    pub(super) fn std_m(&self, rules: &Grips) -> f64 {
+        hands::grip_std_m(self.seen, rules)
     }
 }
 
@@ -64,10 +64,10 @@ impl<'a> SeenFront<'a> {
     }
 
     /// How well it bears out where the hands of all of the part's clips were when it was closed, a logarithm.
-    pub(super) fn bears_out(&self, grips: &[Grip]) -> f64 {
+    pub(super) fn bears_out(&self, grips: &[Grip], rules: &Grips) -> f64 {
         // The face was looked for near its own hand.
         let lost_m = |grip: &Grip| {
-            if grip.clip == self.own.clip { hands::grip_std_m(false) } else { self.handle.rules.travel_m }
+            if grip.clip == self.own.clip { hands::grip_std_m(false, rules) } else { self.handle.rules.travel_m }
         };
         grips.iter().map(|g| self.handle.at_front(self.off(g), g.seen, lost_m(g)).ln()).sum()
     }

@@ -143,7 +143,7 @@ pub(super) fn built(group: &Group, judged: &Judged, likely: &Likely, around: &Ar
         moved: &known.moved,
         depth: known.depth.as_ref(),
     };
-    let uncertainty = uncertainty::of(&evidence, &config.reasoning, &config.part);
+    let uncertainty = uncertainty::of(&evidence, &config.reasoning, &config.part, &config.hands.grips);
     Hypothesis {
         joint: known.joint,
         share: likely.share,

@@ -2,9 +2,9 @@
 
 use super::ClipResult;
 use crate::articulation::{Action, Articulation};
-use crate::config::Config;
+use crate::config::{Config, Grips};
 use crate::geometry::{AxisSource, Face, Rect, candidates};
-use crate::hands::{self, Trajectory};
+use crate::hands::{self, GripStd, Trajectory};
 use crate::inference;
 use crate::inference::uncertainty::OpenStates;
 use crate::localization::Footage;
@@ -51,7 +51,7 @@ impl Believed {
     /// sides better than depth tells hinges. Lines that depth speaks against belong to something else.
     pub(super) fn at_side(self, fit: &Refitted, face: &Face, rect: &Rect, stops: &[Stop], config: &Config) -> Self {
         let agree = config.inference.states.agree_stds;
-        let line_m = AxisSource::Line.position_std_m();
+        let line_m = AxisSource::Line.position_std_m(&config.inference.sources);
         let Some(cov) = fit.depth.hinge_cov_m2 else { return self };
         let Some((along, off)) = front::to_lined_side(face, rect, &fit.joint, stops, &config.part.front) else {
             return self;
@@ -87,7 +87,7 @@ pub(super) fn refitted<'a>(
         .zip(views.iter().zip(&still))
         .map(|((_, t), (views, closed))| OpenState {
             grip: t.closed_grip(),
-            grip_std_m: hands::grip_std_m(t.closed_end_seen()),
+            grip_std: GripStd::of(t, &config.hands.grips),
             views,
             closed,
         })
@@ -166,7 +166,7 @@ fn open_end(
     // A hand that was lost and a part that nobody saw afterwards leave the end open.
     let lever = joint.lever(&state.grip).max(config.part.least_lever_m);
     let unseen = after.is_none() && !trajectory.open_end_seen();
-    let std = if unseen { surest.hypot(hands::grip_std_m(false) / lever) } else { surest };
+    let std = if unseen { surest.hypot(hands::grip_std_m(false, &config.hands.grips) / lever) } else { surest };
     Opening { value, std, informed: after.or(during).is_some() }
 }
 
@@ -214,7 +214,7 @@ fn closed_end(
     let known = ajar::Known {
         end: end.value,
         went: joint.opening_at(&state.grip, &trajectory.open_grip()),
-        went_std: way_std_m(trajectory) / lever,
+        went_std: way_std_m(trajectory, &config.hands.grips) / lever,
         board_m: config.priors.boards.thickness_m,
         shut: config.priors.ranges.shut_share,
     };
@@ -228,7 +228,7 @@ pub(super) fn by_hand(shown: &[(&ClipResult, &Trajectory)], joint: &Articulation
         .map(|(_, t)| {
             let grip = t.closed_grip();
             let value = inference::observed_range(joint, &grip, &t.positions());
-            let std = way_std_m(t) / joint.lever(&grip).max(config.part.least_lever_m);
+            let std = way_std_m(t, &config.hands.grips) / joint.lever(&grip).max(config.part.least_lever_m);
             Opening { value, std, informed: false }
         })
         .collect();
@@ -236,8 +236,8 @@ pub(super) fn by_hand(shown: &[(&ClipResult, &Trajectory)], joint: &Articulation
 }
 
 /// Standard deviation of the way of a hand, metres: of both of its ends.
-fn way_std_m(trajectory: &Trajectory) -> f64 {
-    trajectory.ends_seen.map(hands::grip_std_m).into_iter().fold(0.0, f64::hypot)
+fn way_std_m(trajectory: &Trajectory, rules: &Grips) -> f64 {
+    trajectory.ends_seen.map(|seen| hands::grip_std_m(seen, rules)).into_iter().fold(0.0, f64::hypot)
 }
 
 /// A part stays where it was left: the open end of a clip is where the next clip of the part finds it. Both clips' values

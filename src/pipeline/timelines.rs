@@ -2,14 +2,15 @@
 
 use super::{Scene, SceneJoint};
 use crate::articulation::Action;
+use crate::config;
 use crate::hands::timeline::{Motion, Timeline};
 use crate::recording::Recording;
 
 impl Scene {
     /// The timeline of every joint, in their order.
     #[must_use]
-    pub fn timelines(&self, recording: &Recording) -> Vec<Timeline> {
-        self.joints.iter().map(|joint| Timeline::of(recording, &self.motions(joint))).collect()
+    pub fn timelines(&self, recording: &Recording, config: &config::Hands) -> Vec<Timeline> {
+        self.joints.iter().map(|joint| Timeline::of(recording, &self.motions(joint), config)).collect()
     }
 
     /// What moved a joint's part: clips whose hands were followed, and clips that are told to move it.

@@ -3,6 +3,7 @@
 use crate::articulation::Articulation;
 use crate::config::Config;
 use crate::geometry::{AxisCandidate, Face, Rect, candidates};
+use crate::hands::GripStd;
 use crate::math::Point;
 use crate::part::likelihood::{self, OpenDepth};
 use crate::part::views::View;
@@ -83,7 +84,8 @@ fn with_depth<'j>(
         .iter()
         .map(|ClosedFront { face, rect, grip, grip_std_m }| {
             let depth = OpenDepth::of(face, rect.as_ref(), &clip.open, &config.part);
-            likelihood::log_likelihoods(&depth, joints.clone(), grip, *grip_std_m)
+            let std = GripStd { closed_m: *grip_std_m, lost_m: config.hands.grips.lost_std_m };
+            likelihood::log_likelihoods(&depth, joints.clone(), grip, std)
         })
         .reduce(|best, next| best.iter().zip(&next).map(|(a, b)| a.max(*b)).collect())
         .unwrap_or_else(|| vec![0.0; joints.count()])

@@ -120,8 +120,8 @@ pub fn pose(contact: &Contact) -> Pose {
 
 /// How well the hands tell where the part is held when closed, metres along the motion; `None` without hands.
 #[must_use]
-pub fn point_std_m(hands: &[(String, &Trajectory)]) -> Option<f64> {
-    hands.iter().map(|(_, hand)| grip_std_m(hand.closed_end_seen())).min_by(f64::total_cmp)
+pub fn point_std_m(hands: &[(String, &Trajectory)], rules: &config::Grips) -> Option<f64> {
+    hands.iter().map(|(_, hand)| grip_std_m(hand.closed_end_seen(), rules)).min_by(f64::total_cmp)
 }
 
 #[cfg(test)]

@@ -154,16 +154,18 @@ pub struct Path {
     pub rotations_wxyz: Vec<[f64; 4]>,
 }
 
-/// The primitives of a twin. `seen` is by the joint's id; a joint that is not in it has neither hands nor verdict.
+/// The primitives of a twin. `seen` is by the joint's id; a joint that is not in it has neither hands nor verdict. `grips` tells how
+/// well hands tell where they hold a part.
 #[must_use]
-pub fn of(twin: &Twin, seen: &BTreeMap<&str, Seen>, config: &config::Primitives) -> Primitives {
+pub fn of(twin: &Twin, seen: &BTreeMap<&str, Seen>, grips: &config::Grips, config: &config::Primitives) -> Primitives {
     let system = System::default();
     let nothing = Seen::default();
     let (mut joints, mut left_out) = (Vec::new(), Vec::new());
     for (index, part) in twin.furniture.iter().map(|f| &f.part).enumerate() {
         let straight = grasp::contact(part, config);
         let contact = grasp::tilted(&straight, clear::tilt(twin, index, &straight, config));
-        match of_joint(part, contact, seen.get(part.id.as_str()).unwrap_or(&nothing), &system, config) {
+        let seen = seen.get(part.id.as_str()).unwrap_or(&nothing);
+        match of_joint(part, contact, seen, &system, grips, config) {
             Some(joint) => joints.push(joint),
             None => left_out.push(LeftOut {
                 id: part.id.clone(),
@@ -190,6 +192,7 @@ fn of_joint(
     contact: Contact,
     seen: &Seen,
     system: &System,
+    grips: &config::Grips,
     config: &config::Primitives,
 ) -> Option<JointPrimitives> {
     let (joint, phi) = (&part.joint, part.joint.articulation);
@@ -209,7 +212,7 @@ fn of_joint(
         origin: phi.origin,
         opening_direction: opening_direction(&phi, &contact.point),
         limits: Limits { lower: 0.0, upper: joint.upper, observed: joint.observed, expected: joint.expected },
-        uncertainty: sureness(part, seen),
+        uncertainty: sureness(part, seen, grips),
         contact,
         pregrasp: (back * grasp).into(),
         grasp: grasp.into(),
@@ -226,7 +229,7 @@ fn opening_direction(phi: &Articulation, point: &Point) -> Vector {
     }
 }
 
-fn sureness(part: &Part, seen: &Seen) -> Sureness {
+fn sureness(part: &Part, seen: &Seen, grips: &config::Grips) -> Sureness {
     let said = seen.uncertainty;
     let stds = |c: &[[f64; 2]; 2]| [0, 1].map(|i| c[i][i].max(0.0).sqrt());
     Sureness {
@@ -236,7 +239,7 @@ fn sureness(part: &Part, seen: &Seen) -> Sureness {
         axis_std_rad: said.map(|u| stds(&u.axis_cov_rad2)),
         origin_std_m: said.and_then(|u| u.origin_cov_m2.as_ref().map(stds)),
         observed_std: said.map(|u| u.observed_range_std),
-        contact_std_m: grasp::point_std_m(&seen.hands),
+        contact_std_m: grasp::point_std_m(&seen.hands, grips),
     }
 }
 

@@ -81,7 +81,14 @@ pub(crate) fn twin_of(parts: Vec<Part>) -> Twin {
         .into_iter()
         .map(|part| Furniture { name: format!("{}_base", part.id), carcass: Vec::new(), part })
         .collect();
-    Twin { name: "kitchen".to_owned(), density_kg_per_m3: 600.0, furniture, room: Vec::new(), left_out: Vec::new() }
+    Twin {
+        name: "kitchen".to_owned(),
+        density_kg_per_m3: 600.0,
+        drives: crate::config::Drives::default(),
+        furniture,
+        room: Vec::new(),
+        left_out: Vec::new(),
+    }
 }
 
 /// A door and, beside it, a drawer.
@@ -92,7 +99,7 @@ fn twin() -> Twin {
 #[test]
 fn the_path_is_the_joints_and_the_primitive_stays_on_it_to_millimetres() {
     let twin = twin();
-    let made = of(&twin, &BTreeMap::new(), &config::Primitives::default());
+    let made = of(&twin, &BTreeMap::new(), &config::Grips::default(), &config::Primitives::default());
     assert_eq!((made.joints.len(), made.left_out.len()), (2, 0));
     for (joint, furniture) in made.joints.iter().zip(&twin.furniture) {
         let phi = furniture.part.joint.articulation;
@@ -123,7 +130,7 @@ fn the_path_is_the_joints_and_the_primitive_stays_on_it_to_millimetres() {
 
 #[test]
 fn opening_leaves_the_face_and_the_gripper_waits_before_it() {
-    let made = of(&twin(), &BTreeMap::new(), &config::Primitives::default());
+    let made = of(&twin(), &BTreeMap::new(), &config::Grips::default(), &config::Primitives::default());
     for joint in &made.joints {
         assert!(joint.opening_direction.y < -0.9, "{:?}", joint.opening_direction);
         let way = joint.grasp.position - joint.pregrasp.position;
@@ -153,7 +160,8 @@ fn hands_verdicts_and_covariances_stand_beside_their_joint() {
         uncertainty: Some(&said),
         verdict: Some("pass"),
     };
-    let made = of(&twin(), &BTreeMap::from([("door", seen)]), &config::Primitives::default());
+    let made =
+        of(&twin(), &BTreeMap::from([("door", seen)]), &config::Grips::default(), &config::Primitives::default());
     let [door, drawer] = &made.joints[..] else { panic!("{:?}", made.joints) };
     assert_eq!(door.opening.timing.clip.as_deref(), Some("a"));
     assert_eq!(door.closing.timing.clip.as_deref(), Some("b"));
@@ -172,7 +180,7 @@ fn hands_verdicts_and_covariances_stand_beside_their_joint() {
 fn a_joint_that_cannot_move_costs_itself() {
     let mut twin = twin();
     twin.furniture[0].part.handle = Point::new(f64::NAN, 0.0, 0.0);
-    let made = of(&twin, &BTreeMap::new(), &config::Primitives::default());
+    let made = of(&twin, &BTreeMap::new(), &config::Grips::default(), &config::Primitives::default());
     assert_eq!((made.joints.len(), made.left_out.len()), (1, 1));
     assert_eq!((made.joints[0].joint.as_str(), made.left_out[0].id.as_str()), ("drawer", "door"));
 }
@@ -182,7 +190,8 @@ fn a_joint_that_cannot_move_costs_itself() {
 fn a_turn_about_the_bar_is_in_path_and_primitive() {
     let part = door();
     let contact = grasp::tilted(&grasp::contact(&part, &config::Primitives::default()), [0.2, -0.8]);
-    let made = of_joint(&part, contact, &Seen::default(), &System::default(), &config::Primitives::default()).unwrap();
+    let (grips, config) = (config::Grips::default(), config::Primitives::default());
+    let made = of_joint(&part, contact, &Seen::default(), &System::default(), &grips, &config).unwrap();
     assert!((made.opening.path.positions[PATH - 1] - made.closing.path.positions[0]).norm() < 1e-9);
     for motion in [&made.opening, &made.closing] {
         let quaternion = |i: usize| {
@@ -207,6 +216,7 @@ fn a_turn_of_more_than_half_is_one_turn() {
         grasp::contact(&part, &config::Primitives::default()),
         &Seen::default(),
         &System::default(),
+        &config::Grips::default(),
         &config::Primitives::default(),
     )
     .unwrap();
@@ -225,7 +235,7 @@ fn keys(value: &serde_json::Value) -> Vec<&str> {
 /// What readers of the file rely on. A key that goes or changes its meaning needs another [`SCHEMA`].
 #[test]
 fn the_file_has_the_keys_that_its_schema_promises_and_is_read_back() {
-    let made = of(&twin(), &BTreeMap::new(), &config::Primitives::default());
+    let made = of(&twin(), &BTreeMap::new(), &config::Grips::default(), &config::Primitives::default());
     let text = crate::json::text(&made).unwrap();
     let file: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!(file["schema"], "paws-primitives/1");

@@ -5,7 +5,7 @@ use image::{ExtendedColorType, ImageEncoder, RgbImage, imageops};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::config;
+use crate::config::{self, Config};
 use crate::error::{Error, Result};
 use crate::evaluation::shots::{self, Shot};
 use crate::export::gltf;
@@ -41,8 +41,8 @@ pub struct PageFrame {
 
 /// The timelines of a twin's parts, in its order; a part of which the scene has no joint is closed.
 #[must_use]
-pub fn timelines(recording: &Recording, scene: &Scene, twin: &Twin) -> Vec<Timeline> {
-    let all = scene.timelines(recording);
+pub fn timelines(recording: &Recording, scene: &Scene, twin: &Twin, config: &config::Hands) -> Vec<Timeline> {
+    let all = scene.timelines(recording, config);
     let of = |id: &str| scene.joints.iter().position(|j| j.id == id).and_then(|i| all.get(i)).cloned();
     twin.furniture.iter().map(|f| of(&f.part.id).unwrap_or_default()).collect()
 }
@@ -51,19 +51,16 @@ pub fn timelines(recording: &Recording, scene: &Scene, twin: &Twin) -> Vec<Timel
 ///
 /// # Errors
 /// Images that cannot be decoded.
-pub fn frames(
-    recording: &Recording,
-    scene: &Scene,
-    twin: &Twin,
-    config: &config::Comparison,
-) -> Result<Vec<PageFrame>> {
+pub fn frames(recording: &Recording, scene: &Scene, twin: &Twin, config: &Config) -> Result<Vec<PageFrame>> {
+    let timelines = timelines(recording, scene, twin, &config.hands);
+    let config = &config.comparison;
     let most = config.page_frames;
     let few = config::Comparison {
         frames: ((most as f64 * CLOSED_SHARE).ceil() as usize).max(1),
         open_frames: 1,
         ..config.clone()
     };
-    let chosen = shots::choose(recording, twin, &timelines(recording, scene, twin), &few).chosen;
+    let chosen = shots::choose(recording, twin, &timelines, &few).chosen;
     let (closed, open): (Vec<Shot>, Vec<Shot>) = chosen.into_iter().partition(|s| s.opened().is_empty());
     let room = most.saturating_sub(closed.len());
     let mut shown: Vec<Shot> = closed.into_iter().chain(open.into_iter().take(room)).collect();

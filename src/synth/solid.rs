@@ -19,6 +19,7 @@ pub(super) fn twin(kitchen: &Kitchen, name: String, up: &Vector, priors: &config
     Twin {
         name,
         density_kg_per_m3: priors.boards.density_kg_per_m3,
+        drives: priors.drives.clone(),
         furniture: kitchen.parts.iter().map(|part| furniture(part, up, priors)).collect(),
         room: room.filter(|solid| solid.check().is_ok()).collect(),
         left_out: Vec::new(),

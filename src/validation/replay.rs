@@ -8,7 +8,7 @@ use crate::articulation::{Articulation, JointKind};
 use crate::config;
 use crate::error::{Error, Result};
 use crate::math::{Point, Vector, reject};
-use crate::twin::{MassProperties, Part, mass_properties};
+use crate::twin::{GRAVITY, MassProperties, Part, mass_properties};
 
 /// Where the hand wants the grip to be.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,7 +112,7 @@ pub fn simulate(
     let mass = properties.map_or(0.0, |m| m.mass);
     let damping = 2.0 * (config.hand_stiffness_n_per_m * mass.max(config.least_mass_kg)).sqrt();
     let held = properties.map_or(0.0, |p| held_inertia(joint, &drive.grip, &p, damping * dt / config.taken_share));
-    let mut world = World::new(part, joint, upper, start, held, around, dt)?;
+    let mut world = World::new(part, joint, upper, start, held, around, config)?;
     let start = world.start;
 
     let target = |t: f64| -> Point {
@@ -187,7 +187,7 @@ pub fn simulate(
         sum_along += error.dot(&joint.axis).powi(2);
         counted += 1;
         hand_work += force.dot(&(now - p));
-        let weight_work = -9.81 * mass * (height(&world) - height_at_start);
+        let weight_work = -GRAVITY * mass * (height(&world) - height_at_start);
         out.max_m = out.max_m.max(distance);
         out.peak_force_n = out.peak_force_n.max(strength);
         out.peak_effort = out.peak_effort.max(turning.abs());

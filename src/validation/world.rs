@@ -13,10 +13,11 @@ use rapier3d::prelude::{
 use serde::{Deserialize, Serialize};
 
 use crate::articulation::{Articulation, JointKind};
+use crate::config;
 use crate::error::{Error, Result};
 use crate::fitting::overlap;
 use crate::math::{Point, Pose, Vector};
-use crate::twin::{ContactRules, OrientedBox, Part, Solid, Twin};
+use crate::twin::{ContactRules, GRAVITY, OrientedBox, Part, Solid, Twin};
 
 /// What surrounds a part, world frame, everything closed.
 #[derive(Debug, Clone)]
@@ -186,18 +187,21 @@ impl<'a> World<'a> {
         start: f64,
         held: f64,
         around: &Surroundings<'a>,
-        dt: f64,
+        config: &config::Validation,
     ) -> Result<Self> {
-        let origin = joint.origin;
+        let (origin, dt) = (joint.origin, config.step_secs);
         let mut physics = PhysicsWorld::new();
-        physics.gravity = (around.up * -9.81).cast::<f32>().into();
+        physics.gravity = (around.up * -GRAVITY).cast::<f32>().into();
         physics.integration_parameters.dt = dt as f32;
 
         let mut solids: Vec<&'a Solid> = Vec::new();
         let mut add = |more: &[&'a Solid], moves: bool, density: f64| -> Vec<ColliderBuilder> {
             let first = solids.len();
             solids.extend_from_slice(more);
-            more.iter().zip(first..).map(|(s, number)| collider(s, number, moves, density, &origin)).collect()
+            let build = |(s, number): (&&Solid, usize)| {
+                collider(s, number, moves, density, &origin).friction(config.board_friction as f32)
+            };
+            more.iter().zip(first..).map(build).collect()
         };
         let own: Vec<&'a Solid> = part.solids.iter().collect();
         let own = add(&own, true, around.density);
@@ -314,11 +318,9 @@ fn collider(solid: &Solid, number: usize, moves: bool, density: f64, origin: &Po
     let volume = shrunk.product();
     let density = if volume > 0.0 { density * solid.shape.half.product() / volume } else { density };
     let half = shrunk.cast::<f32>();
-    // Boards and fronts of furniture slide on each other more than they stick.
     ColliderBuilder::cuboid(half.x, half.y, half.z)
         .position(local_pose(&solid.shape, origin))
         .density(density as f32)
-        .friction(0.2)
         .user_data(number as u128)
         .collision_groups(InteractionGroups::new(own, others, InteractionTestMode::And))
         .active_hooks(if moves { ActiveHooks::FILTER_CONTACT_PAIRS } else { ActiveHooks::empty() })

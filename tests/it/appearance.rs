@@ -12,7 +12,7 @@ fn small() -> (Twin, Look) {
     let (recording, scene, twin) = twin_of(SMALL.path());
     assert_eq!(appearance::lacking(&recording), None);
     let config = config::Appearance { triangles: 20_000, ..Default::default() };
-    let look = appearance::look(&recording, &scene, &twin, &config).unwrap();
+    let look = appearance::look(&recording, &scene, &twin, &config::Hands::default(), &config).unwrap();
     (twin, look)
 }
 

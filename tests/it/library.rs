@@ -123,7 +123,7 @@ fn a_played_kitchen_needs_no_folder() {
     let made = Made::of(&recording, &Config::default()).unwrap();
     assert_eq!(made.scene.joints[0].joint.kind, JointKind::Revolute);
     assert_eq!(made.validation.joints[0].verdict, Verdict::Pass);
-    let look = make::look(&recording, &made.scene, &made.twin, &Config::default().appearance).unwrap();
+    let look = make::look(&recording, &made.scene, &made.twin, &Config::default()).unwrap();
     assert!(look.is_some_and(|look| !look.room.is_empty()));
 }
 

@@ -47,6 +47,7 @@ fn twin() -> Twin {
     Twin {
         name: "kitchen".to_owned(),
         density_kg_per_m3: 600.0,
+        drives: paws_twin::config::Drives::default(),
         furniture: vec![furniture],
         room: vec![solid("room_floor", Role::Room, [0.0, 0.0, -0.05], [2.0, 2.0, 0.05])],
         left_out: vec![],

@@ -37,10 +37,11 @@ fn textures_keep_what_surfaces_are_made_of() {
     let (recording, scene, twin) = twin_of(real.path());
     // Both recordings show the same surfaces from the same places: only the colours differ.
     let small = config::Appearance { triangles: 20_000, ..Default::default() };
-    let look = |of: &Recording| appearance::look(of, &scene, &twin, &small).unwrap();
+    let look = |of: &Recording| appearance::look(of, &scene, &twin, &config::Hands::default(), &small).unwrap();
     let looks = [look(&recording), look(&Recording::open(flat.path()).unwrap())];
     let few = config::Comparison { frames: 6, open_frames: 0, ..Default::default() };
-    let shots = shots::choose(&recording, &twin, &page_frames::timelines(&recording, &scene, &twin), &few);
+    let timelines = page_frames::timelines(&recording, &scene, &twin, &config::Hands::default());
+    let shots = shots::choose(&recording, &twin, &timelines, &few);
     let [own, other] = looks.map(|look: Look| {
         let contender = Contender { name: "twin".to_owned(), surfaces: likeness::surfaces(&twin, Some(&look), &[]) };
         let rows = likeness::compare(&recording, &twin, &[contender], &shots.chosen, &few).unwrap();

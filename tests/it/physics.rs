@@ -103,7 +103,14 @@ fn shaken(steady: &Trajectory, std_m: f64, seed: u64) -> Trajectory {
 }
 
 fn twin(furniture: Vec<Furniture>, room: Vec<Solid>) -> Twin {
-    Twin { name: "t".to_owned(), density_kg_per_m3: 700.0, furniture, room, left_out: vec![] }
+    Twin {
+        name: "t".to_owned(),
+        density_kg_per_m3: 700.0,
+        drives: paws_twin::config::Drives::default(),
+        furniture,
+        room,
+        left_out: vec![],
+    }
 }
 
 /// The first joint's check under clips that are its own.

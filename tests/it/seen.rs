@@ -38,8 +38,8 @@ fn closed(rows: &[FrameLikeness]) -> ContenderSummary {
 fn a_twin_looks_more_like_its_recording_than_a_grey_one_and_people_are_left_out() {
     let (recording, scene, twin) = twin_of(SMALL.path());
     let config = config::Appearance { triangles: 20_000, ..Default::default() };
-    let look = appearance::look(&recording, &scene, &twin, &config).unwrap();
-    let timelines = page_frames::timelines(&recording, &scene, &twin);
+    let look = appearance::look(&recording, &scene, &twin, &config::Hands::default(), &config).unwrap();
+    let timelines = page_frames::timelines(&recording, &scene, &twin, &config::Hands::default());
     let few = config::Comparison { frames: 6, open_frames: 2, ..Default::default() };
     let shots = shots::choose(&recording, &twin, &timelines, &few);
     assert!(shots.closed.len() > 6 && shots.chosen.iter().any(|s| !s.opened().is_empty()), "{shots:?}");

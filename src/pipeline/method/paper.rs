@@ -56,7 +56,7 @@ impl Method for Paper {
         let together = if members.len() > 1 { together(group) } else { None };
         let (speaker, joint) = together.unwrap_or((best, own.joint));
         let spoken = clips[speaker].joint.found()?;
-        let chosen = uncertainty::chosen(spoken, &clips[speaker].candidates);
+        let chosen = uncertainty::chosen(spoken, &clips[speaker].candidates, &config.inference.sources);
         let (type_probability, joint_probability) = (own.type_probability, own.joint_probability);
         let answer = Likely::only(joint, chosen, joint_probability, type_probability);
         let likely = vec![answer];

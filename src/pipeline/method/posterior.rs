@@ -42,9 +42,10 @@ impl Method for Posterior {
     }
 
     /// How well its front bears out where all hands were, and how much of what is near lies on it.
-    fn trust(&self, front: &SeenFront, grips: &[Grip], _config: &Config) -> f64 {
+    fn trust(&self, front: &SeenFront, grips: &[Grip], config: &Config) -> f64 {
         // A front is most of what is seen around a hand that holds it: half the support counts a quarter.
-        front.bears_out(grips) + (front.face.support.powi(2) * front.moved / front.own.std_m()).ln()
+        let stds = &config.hands.grips;
+        front.bears_out(grips, stds) + (front.face.support.powi(2) * front.moved / front.own.std_m(stds)).ln()
     }
 
     fn part(&self, group: &Group, reasoner: &dyn Reasoner) -> Option<(Judged, Vec<Hypothesis>)> {
@@ -158,7 +159,7 @@ fn judged(group: &Group, reasoner: &dyn Reasoner, trusted: &[usize], outlines: &
     match likely.first_mut() {
         Some(answer) => answer.joint = joint,
         None => {
-            let chosen = uncertainty::chosen(own, &clip.candidates);
+            let chosen = uncertainty::chosen(own, &clip.candidates, &config.inference.sources);
             likely.push(Likely::only(joint, chosen, joint_probability, type_probability));
         }
     }
@@ -251,7 +252,7 @@ fn asked(
 ) -> Option<(Vec<AxisCandidate>, Answer)> {
     let Group { footage: Footage { recording, sketches, .. }, clips, members, config } = *group;
     let (grip, face) = (clips[best].joint.found()?.grip, clips[best].face);
-    let best_std_m = Grip::of(clips, best)?.std_m();
+    let best_std_m = Grip::of(clips, best)?.std_m(&config.hands.grips);
     let paths: Vec<Vec<Point>> =
         members.iter().filter_map(|&c| clips[c].trajectory.as_ref()).map(Trajectory::positions).collect();
     let pooled = pooled(clips, offering, best, &grip, outlines, &config.inference);
@@ -261,7 +262,8 @@ fn asked(
         if outlines.is_empty() { vec![clips[best].part] } else { outlines.iter().copied().map(Some).collect() };
     let shown = |&c: &usize| {
         let trajectory = clips[c].trajectory.as_ref()?;
-        let (own_grip, own_std_m) = (trajectory.closed_grip(), hands::grip_std_m(trajectory.closed_end_seen()));
+        let own_grip = trajectory.closed_grip();
+        let own_std_m = hands::grip_std_m(trajectory.closed_end_seen(), &config.hands.grips);
         // Depth and hands are biased clip by clip: the face and the grip of the clip itself fit its views best, those
         // of the best clip stand in where it did not see its closed end. Every candidate gets the same choice.
         let own = clips[c].face.filter(|own| {
@@ -314,7 +316,7 @@ fn pooled(
     let kept = |c: &&AxisCandidate| outlines.is_empty() || c.source != AxisSource::PartEdge;
     let own = clips[best].candidates.iter().filter(kept).cloned();
     let Some(face) = &clips[best].face else { return own.collect() };
-    let mut all = candidates::at_sides(face, outlines, grip);
+    let mut all = candidates::at_sides(face, outlines, grip, &config.sources);
     all.extend(own);
     let snap = config.snap_deg.to_radians();
     for &c in group.iter().filter(|&&c| c != best) {
