@@ -96,7 +96,7 @@ pub enum InferenceMethod {
 pub enum GroupingMethod {
     /// The paper's: confident voxels that overlap.
     Voxels,
-    /// Ours: one closed grip, face and outline; what is closed was open.
+    /// Ours: the log odds of one part, and that what is closed was open.
     Places,
 }
 

@@ -39,38 +39,18 @@ block! {
         /// Merge clips of one joint into one scene-level joint (the paper: PAWS-s with it, PAWS without).
         merge_clips: bool = true, "-", "C.2";
         /// How clips of one joint are found: "voxels" (the paper's for Epic-Fields: their confident voxels overlap) or "places"
-        /// (one closed grip, face and outline, and what is closed was open).
+        /// (the log odds of `inference.same_part`: grips, faces, outlines, hinges and names, and that what is closed was open).
         grouping: GroupingMethod = GroupingMethod::Places, "-", "ours";
         /// Grouping "voxels": least intersection over union of two clips of one joint. The paper has no number; on development
         /// seeds of three tiers this finds a third of the pairs, with one wrong one for three right ones.
         merge_voxel_iou: f64 = 0.1, "share", "ours";
-        /// Clips whose closed grips are nearer than this can be one joint.
-        merge_grip_m: f64 = 0.15, "m", "ours";
-        /// A closing belongs to the only part of its name that stands open, if the hands' ways come nearer than this; where
-        /// either clip names nothing, or nothing of that name stands open, to what the clip before it opened.
-        merge_open_m: f64 = 0.5, "m", "ours";
-        /// Clips whose front faces differ by less than this can be one joint.
+        /// Fronts of two clips of one part are one where their normals differ by less than this. Judgement.
         merge_angle_deg: f64 = 25.0, "deg", "ours";
+        /// Fronts of two clips of one part are one where neither is deeper than this: two planes fitted to depth differ by a few
+        /// centimetres. Judgement.
+        merge_deeper_m: f64 = 0.08, "m", "ours";
         /// A hinge's line lies this near to its face: deeper or nearer lines are the carcass, the floor, other furniture. Judgement.
         at_face_m: f64 = 0.08, "m", "ours";
-        /// Of clips that both open, or both close, grips have to be nearer by this factor: a part is opened and closed in turn.
-        /// Judgement.
-        merge_same_action: f64 = 0.6, "share", "ours";
-        /// Of the smaller of two outlines, on the larger one: with less they are two parts. An outline that was seen badly is too
-        /// large rather than elsewhere. Judgement.
-        merge_shared: f64 = 0.5, "share", "ours";
-        /// Outlines with this intersection over union are one: two drawers of one size seen as one share half of their union with
-        /// each of them. Judgement.
-        merge_nearly_one: f64 = 0.6, "share", "ours";
-        /// What lies deeper, along the normal, is another part: two planes fitted to depth differ by a few centimetres. Judgement.
-        merge_deeper_m: f64 = 0.08, "m", "ours";
-        /// A grip is on an outline up to this far beside it: grips are known this well at best. Judgement.
-        merge_beside_m: f64 = 0.05, "m", "ours";
-        /// Two sure hinges are two parts where their lines are farther apart than this, and their axes within `merge_hinge_deg`.
-        /// Judgement: two doors side by side are hinged at their outer edges.
-        merge_hinge_m: f64 = 0.3, "m", "ours";
-        /// Two sure hinges are two parts by their distance only where their axes are within this. Judgement.
-        merge_hinge_deg: f64 = 45.0, "deg", "ours";
         /// A path of smaller extent is the trembling of a hand that holds still. Judgement.
         least_extent_m: f64 = 0.03, "m", "ours";
         /// Draws of the RANSAC for the hand's direction under the paper's rules; with half of the samples off, no clean pair is
@@ -85,6 +65,8 @@ block! {
         arcs: Arcs;
         /// Joints of bare trajectories.
         bare: Bare;
+        /// Whether clips show one part.
+        same_part: SamePart;
         /// Clips of one part to one joint.
         scene: SceneRules;
         /// Which clip saw a part closed best.
@@ -175,6 +157,60 @@ block! {
         own_circle: f64 = 4.0, "-", "ours";
         /// A single point that is so many steps away from the median of its neighbourhood is no motion. Judgement.
         jump_steps: f64 = 4.0, "-", "ours";
+    }
+}
+
+block! {
+    /// Whether two clips show one part, and which part a clip moves: noise, how parts lie beside each other, and how people use them
+    /// (ours). Judgements.
+    SamePart, "inference.same_part", {
+        /// What all hands of a clip are off by together: 3 to 5 % of their distance from the camera.
+        hand_bias_m: f64 = 0.04, "m", "ours";
+        /// Hands and outlines that were seen badly.
+        badly_seen: f64 = 0.2, "share", "ours";
+        /// Faces and hinges of a sure type that are others after all.
+        odd: f64 = 0.05, "share", "ours";
+        /// So far off is what was seen badly, a standard deviation; so deep behind each other lie fronts that are not in one plane.
+        elsewhere_m: f64 = 0.25, "m", "ours";
+        /// Noise between the normals of two clips of one face.
+        face_deg: f64 = 10.0, "deg", "ours";
+        /// Noise between the depths of two clips of one face: two planes fitted to depth differ by a few centimetres.
+        plane_m: f64 = 0.04, "m", "ours";
+        /// What two outlines of one part lack to cover each other, and two of neighbours overlap, on average.
+        outline_off: f64 = 0.2, "share", "ours";
+        /// Noise between two hinges of one part.
+        hinge_m: f64 = 0.12, "m", "ours";
+        /// How far hinges of neighbours are apart, a standard deviation: doors side by side are hinged at their outer edges.
+        hinges_apart_m: f64 = 0.6, "m", "ours";
+        /// Fronts on a square metre of furniture: 30 by 40 cm each.
+        parts_per_m2: f64 = 8.0, "1/m^2", "ours";
+        /// Parts in reach of a person who works in a room.
+        parts: f64 = 20.0, "-", "ours";
+        /// Of parts beside each other, so many lie in one plane.
+        one_plane: f64 = 0.8, "share", "ours";
+        /// Of parts beside each other, so many open alike.
+        alike: f64 = 0.6, "share", "ours";
+        /// Pairs of clips with one name: of those of one part, and of those of two parts that open alike.
+        one_name: [f64; 2] = [0.8, 0.6], "share", "ours";
+        /// Openings that are in no clip: a part was seen to be closed twice.
+        unseen_openings: f64 = 0.05, "share", "ours";
+        /// Closings that are in no clip: people close in passing, and seldom say so.
+        unseen_closings: f64 = 0.35, "share", "ours";
+        /// Of parts that stand open and of which nothing is seen, so many do so still at the next motion of any part.
+        stays_open: f64 = 0.97, "share", "ours";
+        /// Of closings that follow an opening, so many are of the same part, whatever else stands open.
+        closed_at_once: f64 = 0.25, "share", "ours";
+        /// For a part that was used before, against one beside it that was not.
+        used_again_nats: f64 = 0.8, "nats", "ours";
+        /// A clip joins a part that is its own with this probability: a wrong part spoils two joints, a missed one leaves each clip its
+        /// own answer.
+        joins: f64 = 0.67, "share", "ours";
+        /// A clip without a hand is told of a part that it moves with this probability: nothing else speaks for it.
+        told_of: f64 = 0.8, "share", "ours";
+        /// Closed grips of one part are no farther apart: a door's width.
+        near_m: f64 = 0.8, "m", "ours";
+        /// So many clips of a part, those that saw it best, are asked whether another one shows it.
+        asked: usize = 6, "-", "ours";
     }
 }
 

@@ -3,7 +3,9 @@
 pub mod aggregate;
 pub mod bare;
 mod bend;
+pub mod grouping;
 pub mod paper;
+pub mod same_part;
 pub mod uncertainty;
 
 use serde::{Deserialize, Serialize};

@@ -131,8 +131,8 @@ pub struct SceneJoint {
     pub hypotheses: Vec<Hypothesis>,
 }
 
-/// A clip that moves a part without being evidence about it: no hand was followed in it, and by its narration it closes what the
-/// clip before it opened, or opens what the clip after it closes; or its hand is misread, as those of more clips show.
+/// A clip that moves a part without being evidence about it: no hand was followed in it, and by its narration and what stood open
+/// it closes what a clip opened, or opens what a clip closes; or its hand is misread, as those of more clips show.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Told {
     /// Its name.

@@ -3,10 +3,12 @@
 use rayon::prelude::*;
 
 use super::group::Group;
-use super::{ClipResult, SceneJoint, method, told};
-use crate::config::{Config, GroupingMethod};
-use crate::hands::Trajectory;
-use crate::inference::aggregate;
+use super::{ClipResult, SceneJoint, Told, method, told};
+use crate::articulation::Action;
+use crate::config::Config;
+use crate::hands::{self, Trajectory};
+use crate::inference::grouping;
+use crate::inference::same_part::{Name, Sight};
 use crate::localization::Footage;
 use crate::math::Point;
 use crate::reasoning::Reasoner;
@@ -31,28 +33,19 @@ pub(super) fn merge(
     seen.sort_by_key(|(i, c, _)| (c.clip.start_frame, *i));
     let paths: Vec<Vec<Point>> = seen.iter().map(|(.., trajectory)| trajectory.positions()).collect();
     let named: Vec<Option<narration::Reading>> = seen.iter().map(|(_, clip, _)| naming(clip)).collect();
-    let held: Vec<aggregate::Held> = seen
+    let held: Vec<grouping::Held> = seen
         .iter()
         .zip(paths.iter().zip(&named))
-        .map(|((_, clip, trajectory), (path, named))| aggregate::Held {
-            action: trajectory.action,
-            closed: trajectory.closed_grip(),
-            open: trajectory.open_grip(),
-            normal: clip.face.filter(|f| !f.is_assumed()).map(|f| f.normal),
-            path,
-            furniture: named.as_ref().and_then(|r| r.furniture.as_deref()),
-            kind: named.as_ref().and_then(|r| r.kind),
-            part: clip.face.zip(clip.part),
-            joint: clip.joint.found().filter(|j| sure(j.type_probability, config)).map(|j| j.joint),
-            voxels: clip.region.as_ref().map_or_else(Default::default, |region| region.voxels.as_slice()),
-        })
+        .map(|((_, clip, hand), (path, named))| held(clip, hand, path, named.as_ref(), config))
         .collect();
     let unseen = unseen(&seen, clips);
-    let missed: Vec<aggregate::Missed> = unseen
+    let missed: Vec<grouping::Missed> = unseen
         .iter()
-        .map(|(after, furniture)| aggregate::Missed { after: *after, furniture: furniture.as_deref() })
+        .map(|lost| grouping::Missed { after: lost.after, action: lost.action, name: Name::of(lost.named.as_ref()) })
         .collect();
-    let groups: Vec<Vec<usize>> = aggregate::group(&held, &missed, &config.inference)
+    let grouped = grouping::group(&held, &missed, config);
+    let groups: Vec<Vec<usize>> = grouped
+        .parts
         .into_iter()
         .map(|g| g.into_iter().map(|i| seen[i].0).collect::<Vec<usize>>())
         .filter(|g| g.iter().any(|&c| clips[c].joint.found().is_some()))
@@ -64,11 +57,40 @@ pub(super) fn merge(
     for (i, joint) in joints.iter_mut().enumerate() {
         joint.id = format!("joint_{i}");
     }
-    // Clips without a hand have no voxels: the paper's grouping leaves them out.
-    if config.inference.merge_clips && config.inference.grouping == GroupingMethod::Places {
-        told::tie(&mut joints, clips);
-    }
+    let name = |clip: usize| clips[clip].clip.clip.clone();
+    let ties = grouped.ties.iter().map(|tie| Told {
+        clip: name(unseen[tie.missed].clip),
+        with: name(seen[tie.with].0),
+        action: tie.action,
+    });
+    told::tie(&mut joints, ties, clips);
     joints
+}
+
+/// What a clip with a hand shows of the part that it moves.
+fn held<'a>(
+    clip: &'a ClipResult,
+    hand: &Trajectory,
+    path: &'a [Point],
+    named: Option<&'a narration::Reading>,
+    config: &Config,
+) -> grouping::Held<'a> {
+    let joint = clip.joint.found().filter(|j| sure(j.type_probability, config)).map(|j| j.joint);
+    grouping::Held {
+        sight: Sight {
+            grip: hand.closed_grip(),
+            grip_std_m: hands::grip_std_m(hand.closed_end_seen(), &config.hands.grips),
+            face: clip.face.filter(|f| !f.is_assumed()),
+            outline: clip.part,
+            joint,
+            name: Name::of(named),
+        },
+        action: hand.action,
+        open: hand.open_grip(),
+        open_std_m: hands::grip_std_m(hand.open_end_seen(), &config.hands.grips),
+        path,
+        voxels: clip.region.as_ref().map_or_else(Default::default, |region| region.voxels.as_slice()),
+    }
 }
 
 /// What a narration says that names the furniture.
@@ -76,16 +98,37 @@ fn naming(clip: &ClipResult) -> Option<narration::Reading> {
     Some(narration::read(&clip.clip)).filter(narration::Reading::names_furniture)
 }
 
-/// Clips that move something without a hand that was followed: how many of `seen` come before each, and the furniture's name.
-fn unseen(seen: &[(usize, &ClipResult, &Trajectory)], clips: &[ClipResult]) -> Vec<(usize, Option<String>)> {
+/// A clip that moves something without a hand that was followed.
+struct Unseen {
+    /// Its index.
+    clip: usize,
+    /// How many of the clips with a hand come before it.
+    after: usize,
+    /// What its narration says that it does, and what it names.
+    action: Option<Action>,
+    named: Option<narration::Reading>,
+}
+
+/// All of them, in the order of time.
+fn unseen(seen: &[(usize, &ClipResult, &Trajectory)], clips: &[ClipResult]) -> Vec<Unseen> {
     let order = |i: usize| (clips[i].clip.start_frame, i);
-    let before = |i: usize| seen.iter().filter(|(s, ..)| order(*s) < order(i)).count();
-    clips
+    let before = |i: usize| seen.partition_point(|(s, ..)| order(*s) < order(i));
+    let mut all: Vec<Unseen> = clips
         .iter()
         .enumerate()
-        .filter(|(_, c)| c.trajectory.is_none() && narration::read(&c.clip).moves_joint == Some(true))
-        .map(|(i, c)| (before(i), naming(c).and_then(|r| r.furniture)))
-        .collect()
+        .filter(|(_, clip)| clip.trajectory.is_none())
+        .filter_map(|(i, clip)| {
+            let reading = narration::read(&clip.clip);
+            (reading.moves_joint == Some(true)).then(|| Unseen {
+                clip: i,
+                after: before(i),
+                action: reading.action,
+                named: naming(clip),
+            })
+        })
+        .collect();
+    all.sort_by_key(|lost| order(lost.clip));
+    all
 }
 
 /// Groups with their joints, those whose fronts turn out to be one judged `again` together: outlines are known better once all
@@ -96,14 +139,15 @@ fn regrouped(
     again: impl Fn(&[Vec<usize>]) -> Vec<(Vec<usize>, SceneJoint)>,
     config: &Config,
 ) -> Vec<(Vec<usize>, SceneJoint)> {
-    let front = |joint: &SceneJoint| {
-        let hung = Some(joint.joint).filter(|_| sure(joint.type_probability, config));
-        let (face, rect) = joint.face.zip(joint.part)?;
-        Some(aggregate::Front { face, rect, grip: joint.grip, joint: hung })
-    };
     loop {
-        let fronts: Vec<Option<aggregate::Front>> = joints.iter().map(|(_, joint)| front(joint)).collect();
-        let sets = aggregate::same_fronts(&fronts, &config.inference);
+        let named: Vec<Option<narration::Reading>> =
+            joints.iter().map(|(members, _)| members.iter().find_map(|&c| naming(&clips[c]))).collect();
+        let fronts: Vec<Option<Sight>> = joints
+            .iter()
+            .zip(&named)
+            .map(|((members, joint), named)| front_of(members, joint, clips, named.as_ref(), config))
+            .collect();
+        let sets = grouping::same_fronts(&fronts, config);
         if sets.len() == joints.len() {
             return joints;
         }
@@ -119,6 +163,26 @@ fn regrouped(
         joints = alone.iter().flatten().map(|&j| joints[j].clone()).chain(again(&groups)).collect();
         joints.sort_by_key(|(members, _)| members.first().map(|&c| (clips[c].clip.start_frame, c)));
     }
+}
+
+/// What all clips of a part together show of it; none where no front or no outline is known.
+fn front_of<'a>(
+    members: &[usize],
+    joint: &SceneJoint,
+    clips: &[ClipResult],
+    named: Option<&'a narration::Reading>,
+    config: &Config,
+) -> Option<Sight<'a>> {
+    let mut trajectories = members.iter().filter_map(|&c| clips[c].trajectory.as_ref());
+    let seen = trajectories.any(Trajectory::closed_end_seen);
+    Some(Sight {
+        grip: joint.grip,
+        grip_std_m: hands::grip_std_m(seen, &config.hands.grips),
+        face: Some(joint.face?),
+        outline: Some(joint.part?),
+        joint: Some(joint.joint).filter(|_| sure(joint.type_probability, config)),
+        name: Name::of(named),
+    })
 }
 
 /// The groups that have a joint, and it.

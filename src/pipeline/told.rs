@@ -1,51 +1,19 @@
-//! Clips in which no hand was followed, tied by their narrations to the joints that they move (ours).
+//! Clips in which no hand was followed, tied to the joints that they move (ours). What they move is found with the other clips:
+//! [`crate::inference::grouping`].
 
 use super::{ClipResult, SceneJoint, Told};
 use crate::articulation::Action;
-use crate::recording::narration;
 
-/// Ties clips without a hand to the joints that they move by their narrations.
-pub(super) fn tie(joints: &mut [SceneJoint], clips: &[ClipResult]) {
-    for told in told(clips) {
+/// Ties clips without a hand to the joints that they move, where these are opened and closed in turn with them: groups may have
+/// been joined since.
+pub(super) fn tie(joints: &mut [SceneJoint], ties: impl Iterator<Item = Told>, clips: &[ClipResult]) {
+    for told in ties {
         if let Some(joint) = joints.iter_mut().find(|j| j.clips.contains(&told.with))
             && in_turn(&told, &joint.clips, clips)
         {
             joint.told.push(told);
         }
     }
-}
-
-/// Clips without a hand, and what they move by their narrations: who closes something closes what was just opened, unless
-/// it has another name.
-fn told(clips: &[ClipResult]) -> Vec<Told> {
-    let mut moving: Vec<(&ClipResult, narration::Reading)> = clips
-        .iter()
-        .map(|clip| {
-            let reading = narration::read(&clip.clip);
-            (
-                clip,
-                narration::Reading { action: clip.trajectory.as_ref().map(|t| t.action).or(reading.action), ..reading },
-            )
-        })
-        .filter(|(clip, reading)| clip.trajectory.is_some() || reading.moves_joint == Some(true))
-        .collect();
-    moving.sort_by_key(|(clip, _)| clip.clip.start_frame);
-    moving
-        .windows(2)
-        .filter_map(|pair| {
-            let [(before, opens), (after, closes)] = pair else { return None };
-            let name = |reading: &narration::Reading| reading.furniture.clone().filter(|_| reading.names_furniture());
-            let one = name(opens).zip(name(closes)).is_none_or(|(a, b)| a == b);
-            let actions = [opens.action, closes.action] == [Some(Action::Open), Some(Action::Close)];
-            let (lost, with) = match [before, after].map(|c| c.trajectory.is_some()) {
-                [true, false] => (after, before),
-                [false, true] => (before, after),
-                _ => return None,
-            };
-            let action = if lost.clip.start_frame == after.clip.start_frame { Action::Close } else { Action::Open };
-            (one && actions).then(|| Told { clip: lost.clip.clip.clone(), with: with.clip.clip.clone(), action })
-        })
-        .collect()
 }
 
 /// Whether a part is opened and closed in turn with that clip among those that show it.
@@ -69,7 +37,7 @@ pub(super) mod tests {
     use super::*;
     use crate::hands::{Sample, Trajectory};
     use crate::math::Point;
-    use crate::recording::Clip;
+    use crate::recording::{Clip, narration};
 
     /// Clips by narration and whether a hand was followed, in the order of time.
     pub(in crate::pipeline) fn clips(said: &[(&str, bool)]) -> Vec<ClipResult> {
@@ -88,34 +56,17 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_clip_without_a_hand_moves_what_its_narration_says() {
-        let told = |said: &[(&str, bool)]| -> Vec<[String; 2]> {
-            told(&clips(said)).into_iter().map(|t| [t.clip, t.with]).collect()
-        };
-        let pair = |clip: &str, with: &str| vec![[clip.to_owned(), with.to_owned()]];
-        assert_eq!(told(&[("open the oven", true), ("close the oven", false)]), pair("1", "0"));
-        assert_eq!(told(&[("open the drawer", false), ("close it", true)]), pair("0", "1"));
-        // What moves nothing does not come between.
-        let between = [("open the oven", true), ("wash hands", false), ("close the oven", false)];
-        assert_eq!(told(&between), pair("2", "0"));
-        for said in [
-            [("open the oven", true), ("close the drawer", false)],
-            [("close the oven", true), ("close the oven", false)],
-            [("open the oven", false), ("open the oven", true)],
-            [("open the oven", false), ("close the oven", false)],
-            [("open the oven", true), ("close the oven", true)],
-        ] {
-            assert!(told(&said).is_empty(), "{said:?}");
-        }
-        // What is shut already is not closed, what stands open not opened.
-        let tied = |said: &[(&str, bool)], shown: &[&str]| {
-            let clips = clips(said);
+    fn what_is_shut_already_is_not_closed_and_what_stands_open_not_opened() {
+        let told = |clip: &str, with: &str, action| Told { clip: clip.to_owned(), with: with.to_owned(), action };
+        let tied = |said: &[(&str, bool)], told: &Told, shown: &[&str]| {
             let shown: Vec<String> = shown.iter().map(|&s| s.to_owned()).collect();
-            super::told(&clips).iter().filter(|t| in_turn(t, &shown, &clips)).count()
+            in_turn(told, &shown, &clips(said))
         };
         let open_twice = [("open the oven", true), ("open it", false), ("close the oven", true)];
+        let opened = told("1", "2", Action::Open);
+        assert!(!tied(&open_twice, &opened, &["0", "2"]) && tied(&open_twice, &opened, &["2"]));
         let shut_twice = [("open the oven", true), ("close it", false), ("close the oven", true)];
-        assert_eq!((tied(&open_twice, &["0", "2"]), tied(&open_twice, &["2"])), (0, 1));
-        assert_eq!((tied(&shut_twice, &["0", "2"]), tied(&shut_twice, &["0"])), (0, 1));
+        let closed = told("1", "0", Action::Close);
+        assert!(!tied(&shut_twice, &closed, &["0", "2"]) && tied(&shut_twice, &closed, &["0"]));
     }
 }
