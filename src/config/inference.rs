@@ -204,7 +204,7 @@ block! {
         used_again_nats: f64 = 0.8, "nats", "ours";
         /// A clip joins a part that is its own with this probability: a wrong part spoils two joints, a missed one leaves each clip its
         /// own answer.
-        joins: f64 = 0.67, "share", "ours";
+        joins: f64 = 0.8, "share", "ours";
         /// A clip without a hand is told of a part that it moves with this probability: nothing else speaks for it.
         told_of: f64 = 0.8, "share", "ours";
         /// Closed grips of one part are no farther apart: a door's width.

@@ -13,7 +13,7 @@
 //! likelier than all else.
 
 use super::paper;
-use super::same_part::{Model, Name, Sight, Terms, log_odds, nats, together};
+use super::same_part::{Hands, Model, Name, Sight, Terms, averaged, log_odds, nats, together};
 use crate::articulation::Action;
 use crate::config::{Config, GroupingMethod, SamePart};
 use crate::math::Point;
@@ -187,7 +187,7 @@ impl Pass<'_> {
                 (model.worth(&other.sight), model.terms(&other.sight, &held.sight, hands))
             })
             .collect();
-        Some(together(&sights))
+        Some(together(&sights, model.rules.badly_seen))
     }
 
     /// How likely a clip shows the part of such odds, among all other ones. Parts that may be this one under two names do not stand
@@ -264,9 +264,9 @@ impl Pass<'_> {
             _ => {
                 let of = |&j: &usize| {
                     let sight = &self.clips[j].sight;
-                    (model.worth(sight), [None, None, None, None, model.names(sight.name, name)])
+                    Some((model.worth(sight), model.names(sight.name, name)?.exp()))
                 };
-                together(&part.asked.iter().map(of).collect::<Vec<_>>())
+                nats(averaged(part.asked.iter().filter_map(of)))
             }
         };
         called + rules.used_again_nats + action.map_or(0.0, |action| turn(part, action, rules))
@@ -338,21 +338,20 @@ fn turn(part: &Part, action: Action, rules: &SamePart) -> f64 {
 }
 
 /// Odds of one part by the hands of an opening and the closing that follows: the part stands where it was left, so that its open
-/// ends tell, too. The ends are compared that were seen better. Where no end was seen by both hands, either that, or that one hand
-/// went where the other one did.
-fn handed_over(opened: &Held, closed: &Held, model: &Model) -> f64 {
+/// ends tell, too, and that one hand went where the other one did. If all was seen well, the ends are compared that were seen better.
+/// If a closed end was not, the face and the hinge that were looked for near it say nothing, but the other end and the way do.
+fn handed_over(opened: &Held, closed: &Held, model: &Model) -> Hands {
     let (a, b) = (&opened.sight, &closed.sight);
     let shut_m2 = model.variance(a.grip_std_m, b.grip_std_m);
     let open_m2 = model.variance(opened.open_std_m, closed.open_std_m);
-    let ends = match open_m2 < shut_m2 {
-        true => model.near((opened.open - closed.open).norm(), open_m2),
-        false => model.grips(a, b),
-    };
     let way_m2 = model.variance(a.grip_std_m.min(opened.open_std_m), b.grip_std_m.min(closed.open_std_m));
-    if way_m2 >= shut_m2.min(open_m2) {
-        return ends;
-    }
-    0.5 * (ends + model.near(apart(opened.path, closed.path), way_m2))
+    let shut = model.grips(a, b);
+    let open = model.near((opened.open - closed.open).norm(), open_m2);
+    let way = model.near(apart(opened.path, closed.path), way_m2);
+    let ends = if open_m2 < shut_m2 { open.well } else { shut.well };
+    // Where no end was seen by both hands, the way tells as much.
+    let well = if way_m2 < shut_m2.min(open_m2) { 0.5 * (ends + way.well) } else { ends };
+    Hands { well, badly: (shut.badly + open.well + way.well) / 3.0 }
 }
 
 /// Shortest distance between the points of two paths; infinite where one has none.
@@ -449,7 +448,7 @@ mod tests {
         let rows: [Vec<[i32; 3]>; 3] = [0..9, 20..29, 1..9].map(|xs| xs.map(|x| [x, 0, 0]).collect());
         let [here, far, again] = &rows;
         // One grip when closed, which tells them to be one part.
-        let clip = |voxels| Held { voxels, ..held(Action::Open, [0.0, 0.0, 0.7], [0.0, 0.4, 0.7]) };
+        let clip = |voxels| Held { voxels, ..pulled(Action::Open, 0.0, name("drawer")) };
         let clips = [here, far, again].map(|row| clip(row.as_slice()));
         let with = |merge_clips, grouping| {
             let inference = Inference { merge_clips, grouping, ..Default::default() };
@@ -476,6 +475,7 @@ mod tests {
                 &Held { path: way(x), ..lost(closed) },
                 &Model::of(&model),
             )
+            .well
         };
         assert!(odds(0.1) > 5.0 * odds(0.6), "{} {}", odds(0.1), odds(0.6));
     }
@@ -493,23 +493,23 @@ mod tests {
         assert_eq!(parts(&[open(here), open(far), open(0.5), close(near)], &[]), [vec![0], vec![1], vec![2, 3]]);
         // Closed already, and called by another name right after it was opened.
         assert_eq!(parts(&[open(here), close(here), close(near)], &[]).len(), 2);
-        let oven = pulled(Action::Close, near, name("oven"));
+        let oven = pulled(Action::Close, 0.2, name("oven"));
         assert_eq!(parts(&[open(here), oven], &[]).len(), 1);
         // Unless that is elsewhere, or something was opened since.
         assert_eq!(parts(&[open(far), oven], &[]).len(), 2);
         assert_eq!(parts(&[open(here), open(far), oven], &[]).len(), 3);
         // Without a name, it is what stands open there.
-        let it = pulled(Action::Close, near, Name::default());
+        let it = pulled(Action::Close, 0.2, Name::default());
         assert_eq!(parts(&[open(here), it], &[]).len(), 1);
         assert_eq!(parts(&[open(here), open(far), it], &[]), [vec![0, 2], vec![1]]);
     }
 
     #[test]
     fn what_was_opened_twice_was_closed_by_somebody_where_the_hands_meet() {
-        let at = |x: f64| pulled(Action::Open, x, Name::default());
+        let at = |x: f64| pulled(Action::Open, x, name("drawer"));
         assert_eq!(parts(&[at(0.0), at(0.0)], &[]), [vec![0, 1]]);
         // A hand's width beside it, that is said of a part that was closed only.
-        let closed = pulled(Action::Close, 0.0, Name::default());
+        let closed = pulled(Action::Close, 0.0, name("drawer"));
         assert_eq!(parts(&[at(0.0), at(0.12)], &[]).len(), 2);
         assert_eq!(parts(&[at(0.0), closed, at(0.06)], &[]).len(), 1);
     }
@@ -525,7 +525,8 @@ mod tests {
         assert_eq!(parts(&[opened, closed("drawer")], &missed(Some("drawer"))).len(), 2);
         assert_eq!(parts(&[opened, closed("drawer")], &missed(None)).len(), 2);
         // One of another name did not.
-        assert_eq!(parts(&[opened, closed("drawer")], &missed(Some("oven"))).len(), 1);
+        let near = pulled(Action::Close, 0.2, name("drawer"));
+        assert_eq!(parts(&[opened, near], &missed(Some("oven"))).len(), 1);
     }
 
     #[test]

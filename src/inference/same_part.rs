@@ -2,8 +2,9 @@
 //! under two parts beside each other (ours).
 //!
 //! It is a sum of terms, one for each kind of evidence, each taken as independent of the others. Every likelihood has a share of
-//! things that were seen badly, so that no term can decide against all others. The numbers are `inference.same_part`; what usual
-//! cases add up to is in `docs/evidence.md`.
+//! things that were seen badly, so that no term can decide against all others. Where a hand was seen badly, so were the face, the
+//! outline and the hinge that were looked for near it: they have one such share together. The numbers are `inference.same_part`;
+//! what usual cases add up to is in `docs/evidence.md`.
 
 use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
@@ -47,17 +48,33 @@ pub struct Sight<'a> {
     pub name: Name<'a>,
 }
 
-/// Definition: kinds of evidence: grips, faces, outlines, hinges, names.
-const KINDS: usize = 5;
+/// Definition: kinds of evidence beside the hands: faces, outlines, hinges.
+const KINDS: usize = 3;
 
-/// Nats of each kind of evidence for one part, none where it was not seen.
-pub(super) type Terms = [Option<f64>; KINDS];
+/// Evidence for one part.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Terms {
+    pub(super) hands: Hands,
+    /// Nats of each kind if the hands were seen well, none where it was not seen.
+    pub(super) seen: [Option<f64>; KINDS],
+    /// Nats of the names.
+    pub(super) names: Option<f64>,
+}
+
+/// Odds of one part by the hands.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Hands {
+    /// If they were seen as well as their standard deviations say.
+    pub(super) well: f64,
+    /// If one of them was seen badly.
+    pub(super) badly: f64,
+}
 
 /// Log odds of one part against two parts beside each other, nats.
 #[must_use]
 pub fn log_odds(a: &Sight, b: &Sight, config: &Config) -> f64 {
     let model = Model::of(config);
-    model.terms(a, b, model.grips(a, b)).into_iter().flatten().sum()
+    together(&[(1.0, model.terms(a, b, model.grips(a, b)))], model.rules.badly_seen)
 }
 
 /// The natural logarithm of an odds ratio, finite where it is too small for a number.
@@ -96,20 +113,19 @@ impl<'a> Model<'a> {
 
     /// Odds of one part where two hands are such a distance apart: their density about one handle, against that of other parts'
     /// handles on the furniture around.
-    pub(super) fn near(&self, distance_m: f64, variance: f64) -> f64 {
-        let density = |v: f64| (-0.5 * distance_m.powi(2) / v).exp() / (TAU * v);
-        let SamePart { badly_seen, elsewhere_m, parts_per_m2, .. } = *self.rules;
-        let badly = density(variance.max(elsewhere_m.powi(2)));
-        ((1.0 - badly_seen) * density(variance) + badly_seen * badly) / parts_per_m2
+    pub(super) fn near(&self, distance_m: f64, variance: f64) -> Hands {
+        let SamePart { elsewhere_m, parts_per_m2, .. } = *self.rules;
+        let odds = |v: f64| (-0.5 * distance_m.powi(2) / v).exp() / (TAU * v * parts_per_m2);
+        Hands { well: odds(variance), badly: odds(variance.max(elsewhere_m.powi(2))) }
     }
 
     /// Odds by the closed grips.
-    pub(super) fn grips(&self, a: &Sight, b: &Sight) -> f64 {
+    pub(super) fn grips(&self, a: &Sight, b: &Sight) -> Hands {
         self.near((a.grip - b.grip).norm(), self.variance(a.grip_std_m, b.grip_std_m))
     }
 
-    /// All kinds of evidence, that of the hands given as odds.
-    pub(super) fn terms(&self, a: &Sight, b: &Sight, hands: f64) -> Terms {
+    /// All kinds of evidence, that of the hands given.
+    pub(super) fn terms(&self, a: &Sight, b: &Sight, hands: Hands) -> Terms {
         let faces = a.face.zip(b.face);
         let outlines = faces.zip(a.outline.zip(b.outline)).and_then(|(faces, rects)| {
             let depth_m = coplanar(faces)?;
@@ -117,13 +133,9 @@ impl<'a> Model<'a> {
             let seen = nats(self.planes(depth_m, Some(shared))) - nats(self.planes(depth_m, None));
             Some(seen + self.holds((&faces.0, &rects.0), b) + self.holds((&faces.1, &rects.1), a))
         });
-        [
-            Some(nats(hands)),
-            faces.map(|faces| self.faces(faces)),
-            outlines,
-            a.joint.zip(b.joint).and_then(|(a, b)| self.hinges(&a, &b)),
-            self.names(a.name, b.name),
-        ]
+        let hinges = a.joint.zip(b.joint).and_then(|(a, b)| self.hinges(&a, &b));
+        let seen = [faces.map(|faces| self.faces(faces)), outlines, hinges];
+        Terms { hands, seen, names: self.names(a.name, b.name) }
     }
 
     /// Faces of one part look one way and lie in one plane. So do most faces beside each other: this speaks against one part
@@ -224,13 +236,19 @@ fn shared((face, mine): (&Face, &Rect), (other_face, theirs): (&Face, &Rect)) ->
 /// What several sights of one part say of another sight, nats: each kind of evidence is asked of those that saw it, and their
 /// odds are averaged by what each sight is worth. A part is known no better than its best sights know it, so that their nats do
 /// not add up, and one that was seen badly does not outvote the others.
-pub(super) fn together(sights: &[(f64, Terms)]) -> f64 {
-    let of_kind = |kind: usize| {
-        let seen = sights.iter().filter_map(|(worth, terms)| Some((*worth, terms[kind]?)));
-        let (worth, odds) = seen.fold((0.0, 0.0), |(all, sum), (worth, nats)| (all + worth, sum + worth * nats.exp()));
-        if worth > 0.0 { nats(odds / worth) } else { 0.0 }
+pub(super) fn together(sights: &[(f64, Terms)], badly_seen: f64) -> f64 {
+    let of = |kind: &dyn Fn(&Terms) -> Option<f64>| {
+        averaged(sights.iter().filter_map(|(worth, terms)| Some((*worth, kind(terms)?))))
     };
-    (0..KINDS).map(of_kind).sum()
+    let beside: f64 = (0..KINDS).map(|kind| of(&|terms| terms.seen[kind].map(f64::exp))).product();
+    let [well, badly] = [of(&|terms| Some(terms.hands.well)), of(&|terms| Some(terms.hands.badly))];
+    nats((1.0 - badly_seen) * well * beside + badly_seen * badly) + nats(of(&|terms| terms.names.map(f64::exp)))
+}
+
+/// Odds, each with what it is worth, as one; 1, which says nothing, of none.
+pub(super) fn averaged(odds: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let (worth, sum) = odds.fold((0.0, 0.0), |(all, sum), (worth, odds)| (all + worth, sum + worth * odds));
+    if worth > 0.0 { sum / worth } else { 1.0 }
 }
 
 #[cfg(test)]
@@ -314,14 +332,27 @@ mod tests {
 
     #[test]
     fn sights_of_one_part_are_averaged_kind_by_kind() {
-        let good = [Some(1.0), None, Some(-3.0), None, None];
-        let badly = [Some(-4.0), None, None, None, None];
-        let one = together(&[(1.0, good)]);
+        let terms = |hands: f64, outline: Option<f64>| Terms {
+            hands: Hands { well: hands.exp(), badly: 0.0 },
+            seen: [None, outline, None],
+            names: None,
+        };
+        let (good, badly) = (terms(1.0, Some(-3.0)), terms(-4.0, None));
+        let all = |sights: &[(f64, Terms)]| together(sights, 0.0);
+        let one = all(&[(1.0, good)]);
         assert!((one + 2.0).abs() < 1e-9);
         // Twice the same is no more than once; who saw no outline does not blur what the other one's says.
-        assert!((together(&[(1.0, good), (1.0, good)]) - one).abs() < 1e-9);
-        let mixed = together(&[(1.0, good), (0.1, badly)]);
+        assert!((all(&[(1.0, good), (1.0, good)]) - one).abs() < 1e-9);
+        let mixed = all(&[(1.0, good), (0.1, badly)]);
         assert!(mixed < one && mixed > one - 0.5, "{mixed}");
-        assert!(together(&[]).abs() < 1e-12);
+        assert!(all(&[]).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_was_looked_for_near_a_hand_that_was_seen_badly_says_little() {
+        let hands = Hands { well: 1e-9, badly: 0.5 };
+        let terms = Terms { hands, seen: [Some(-2.0), Some(-6.0), Some(-3.0)], names: None };
+        let there = together(&[(1.0, terms)], 0.2);
+        assert!((there - 0.1_f64.ln()).abs() < 1e-6, "{there}");
     }
 }
