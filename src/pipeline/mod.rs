@@ -17,6 +17,7 @@ mod weigh;
 mod without_depth;
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -281,19 +282,10 @@ fn with_depth(
     progress: Progress,
     store: &dyn LookStore,
 ) -> Result<Scene> {
-    let counter = std::sync::atomic::AtomicUsize::new(0);
-    let start = |step: &str, total: usize| {
-        counter.store(0, std::sync::atomic::Ordering::Relaxed);
-        progress(step, 0, total);
-    };
-    let tick = |step: &str, total: usize| {
-        let done = counter.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
-        progress(step, done, total);
-    };
-
+    let steps = Steps::of(progress);
     // Hands, clip by clip; they tell which frames are needed.
     let at_work = AtWork::of(recording);
-    start("following hands", 1);
+    steps.start("following hands", 1);
     let holds = contact::holds(recording, &at_work, &config.hands)?;
     let followed: Vec<clip::Followed> = recording
         .clips
@@ -302,25 +294,8 @@ fn with_depth(
         .map(|(clip, hold)| clip::follow(recording, clip, hold.as_ref(), &at_work, config))
         .collect();
 
+    let looking = Looking { recording, detector, config, store, steps: &steps };
     let mut looks = Looks::default();
-    let look = |looks: &mut Looks, frames: Vec<usize>, lines: bool| -> Result<()> {
-        let mut fresh: Vec<usize> = frames.into_iter().filter(|f| !looks.sketches.contains_key(f)).collect();
-        sort_unique(&mut fresh);
-        start("looking", fresh.len());
-        let seen: Vec<Option<(Sketch, Vec<LiftedSegment>)>> = fresh
-            .par_iter()
-            .map(|&frame| {
-                let seen = look_once(recording, frame, lines.then_some(detector), config, store);
-                tick("looking", fresh.len());
-                seen
-            })
-            .collect::<Result<_>>()?;
-        for (sketch, segments) in seen.into_iter().flatten() {
-            looks.segments.insert(sketch.frame, segments);
-            looks.sketches.insert(sketch.frame, sketch);
-        }
-        Ok(())
-    };
     let metric = |recording: &Recording, looks: &Looks| Recording {
         depth_factors: match config.geometry.depth_scale {
             true => depth_scale::solve(recording, &looks.sketches, &config.geometry.scales),
@@ -333,11 +308,11 @@ fn with_depth(
     if config.localization.closed_state_frames || config.geometry.depth_scale {
         still.extend(views::survey(recording, &at_work, config.localization.survey_frames));
     }
-    look(&mut looks, still, true)?;
-    look(&mut looks, followed.iter().flat_map(|f| f.open.iter().copied()).collect(), false)?;
+    looks.take(still, true, &looking)?;
+    looks.take(followed.iter().flat_map(|f| f.open.iter().copied()).collect(), false, &looking)?;
     let located_in = metric(recording, &looks);
     let total = recording.clips.len();
-    start("localising", total);
+    steps.start("localising", total);
     let occupancy =
         config.localization.occlusion.then(|| views::Occupancy::of(&located_in, &looks.sketches, &config.localization));
     let idle = views::idle(recording, &at_work, &config.localization);
@@ -349,17 +324,17 @@ fn with_depth(
         .zip(followed)
         .map(|(clip, followed)| {
             let located = clip::locate(&footage, clip, followed, &idle, occupancy.as_ref(), config);
-            tick("localising", total);
+            steps.tick("localising", total);
             located
         })
         .collect();
 
     let mut wanted: Vec<usize> = located.iter().flat_map(|l| l.views.iter().copied()).collect();
     sort_unique(&mut wanted);
-    look(&mut looks, wanted.clone(), true)?;
+    looks.take(wanted.clone(), true, &looking)?;
     // What more was looked at meanwhile tells the factors better, from where they are.
     let rectified = metric(&located_in, &looks);
-    start("finding lines", 1);
+    steps.start("finding lines", 1);
     for (frame, segments) in &mut looks.segments {
         let factor = rectified.depth_factor(*frame);
         segments.iter_mut().for_each(|s| *s = s.scaled(factor));
@@ -373,7 +348,7 @@ fn with_depth(
     };
     let room = manhattan::estimate(&rectified, &with_normals_first(recording, &wanted, config), &config.geometry)?;
 
-    start("inferring", total);
+    steps.start("inferring", total);
     let footage = Footage { recording: &rectified, sketches: &looks.sketches, at_work: &at_work, located: &located_in };
     let seen = clip::Seen { footage, segments: &looks.segments, lines: &lines, room: room.as_ref() };
     let clips: Vec<ClipResult> = recording
@@ -382,7 +357,7 @@ fn with_depth(
         .zip(located)
         .map(|(clip, located)| {
             let result = clip::infer(clip, located, &seen, reasoner, config);
-            tick("inferring", total);
+            steps.tick("inferring", total);
             result
         })
         .collect::<Result<_>>()?;
@@ -393,6 +368,36 @@ fn with_depth(
     Ok(Scene { recording, manhattan: room, videos, depth_factors, clips, joints, surroundings })
 }
 
+/// Tells how far a step is that several threads work at.
+struct Steps<'a> {
+    progress: Progress<'a>,
+    done: AtomicUsize,
+}
+
+impl<'a> Steps<'a> {
+    fn of(progress: Progress<'a>) -> Self {
+        Self { progress, done: AtomicUsize::new(0) }
+    }
+
+    fn start(&self, step: &str, total: usize) {
+        self.done.store(0, Ordering::Relaxed);
+        (self.progress)(step, 0, total);
+    }
+
+    fn tick(&self, step: &str, total: usize) {
+        (self.progress)(step, self.done.fetch_add(1, Ordering::Relaxed) + 1, total);
+    }
+}
+
+/// With what frames are looked at.
+struct Looking<'a> {
+    recording: &'a Recording,
+    detector: &'a dyn LineDetector,
+    config: &'a Config,
+    store: &'a dyn LookStore,
+    steps: &'a Steps<'a>,
+}
+
 /// What was kept of the frames that were looked at.
 #[derive(Debug, Default)]
 struct Looks {
@@ -400,6 +405,29 @@ struct Looks {
     sketches: BTreeMap<usize, Sketch>,
     /// Line segments of the frames in which nothing moves.
     segments: BTreeMap<usize, Vec<LiftedSegment>>,
+}
+
+impl Looks {
+    /// Looks at those of the frames that nobody has looked at; for line segments, too, where asked.
+    fn take(&mut self, mut frames: Vec<usize>, lines: bool, with: &Looking) -> Result<()> {
+        let Looking { recording, detector, config, store, steps } = *with;
+        frames.retain(|frame| !self.sketches.contains_key(frame));
+        sort_unique(&mut frames);
+        steps.start("looking", frames.len());
+        let seen: Vec<Option<(Sketch, Vec<LiftedSegment>)>> = frames
+            .par_iter()
+            .map(|&frame| {
+                let seen = look_once(recording, frame, lines.then_some(detector), config, store);
+                steps.tick("looking", frames.len());
+                seen
+            })
+            .collect::<Result<_>>()?;
+        for (sketch, segments) in seen.into_iter().flatten() {
+            self.segments.insert(sketch.frame, segments);
+            self.sketches.insert(sketch.frame, sketch);
+        }
+        Ok(())
+    }
 }
 
 /// What a store has of a frame, else a look at it, which is kept.
