@@ -66,62 +66,7 @@ fn fitted(seen: &Seen, config: &Config) -> Option<Rect> {
     let climbed = starts.map(|start| climbed(start, &marks, rules.least_m, worth));
     let (_, at) = climbed.into_iter().reduce(|best, next| if next.0 > best.0 { next } else { best })?;
     let rect = rect_at(&at);
-    (evidence.moved_m2(&rect) >= config.part.least_moved_m2).then(|| run_on(rect, &evidence, seen.stops, rules))
-}
-
-/// A front whose flanks run on beyond its end, where nothing crosses them and no view says whether the surface between them
-/// moved, runs on with them: of a tall door that is open a person sees the lower half.
-fn run_on(mut rect: Rect, evidence: &Evidence, stops: &[Stop], rules: &config::FrontFit) -> Rect {
-    for (axis, end) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-        if let Some(side) = runs_to(&rect, axis, end, evidence, stops, rules) {
-            rect.bounds[axis][end] = side;
-        }
-    }
-    rect
-}
-
-/// Where the side at an end along an axis comes to lie then; `None` where it stays.
-fn runs_to(
-    rect: &Rect,
-    axis: usize,
-    end: usize,
-    evidence: &Evidence,
-    stops: &[Stop],
-    rules: &config::FrontFit,
-) -> Option<f64> {
-    let (side, across) = (rect.bounds[axis][end], rect.bounds[1 - axis]);
-    let cell_m = evidence.grid.cell_m;
-    let outward = if end == 1 { 1.0 } else { -1.0 };
-    let crossed = |at: f64| {
-        let lines = stops.iter().filter(|(a, offset, _)| *a == axis && (offset - at).abs() <= cell_m);
-        lines.map(|(.., span)| share_of(across, span)).fold(0.0, f64::max) >= rules.lined_share
-    };
-    if crossed(side) || evidence.ended(axis, end, rect) >= rules.lined_share {
-        return None;
-    }
-    // How far the lines along a flank run on.
-    let flank = |at: f64| {
-        let along = stops.iter().filter(|(a, offset, span)| {
-            *a != axis && (offset - at).abs() < rules.on_line_m && (span[0]..=span[1]).contains(&side)
-        });
-        along.map(|(.., span)| outward * (span[end] - side)).fold(0.0, f64::max)
-    };
-    let steps = (across.map(flank).into_iter().fold(f64::INFINITY, f64::min) / cell_m) as usize;
-    let mut reached = None;
-    for step in 1..=steps {
-        let [from, to] = [step - 1, step].map(|i| side + outward * cell_m * i as f64);
-        let mut strip = *rect;
-        strip.bounds[axis] = [from.min(to), from.max(to)];
-        let cells = (across[1] - across[0]) / cell_m;
-        if (evidence.over(&evidence.weights, &strip) / cells).abs() >= rules.moved {
-            break;
-        }
-        reached = Some(to);
-        if crossed(to) {
-            break;
-        }
-    }
-    reached
+    (evidence.moved_m2(&rect) >= config.part.least_moved_m2).then_some(rect)
 }
 
 /// The best rectangle that is reached by choosing both sides along one axis, then along the other, until neither changes; and
@@ -463,33 +408,6 @@ mod tests {
         }
         let drawer = Articulation { kind: JointKind::Prismatic, axis: -Vector::y(), origin: Point::origin() };
         assert!(way(&drawer, &line(0, left, 0.9)).is_none());
-    }
-
-    #[test]
-    fn a_front_runs_on_with_its_flanks_where_no_view_looks() {
-        // A square that moved, seen surface of which nobody knows above it, and bare beyond that.
-        let grid = Grid { cell_m: 0.02, origin: [-0.5, -0.5], columns: 50, rows: 100 };
-        let up = |i: usize| -0.5 + 0.02 * (i / 50) as f64;
-        let weights: Vec<f64> = (0..50 * 100)
-            .map(|i| match up(i) {
-                up if up < 0.2 => 0.4,
-                up if up < 0.9 => 0.0,
-                _ => -0.3,
-            })
-            .collect();
-        let ends = [0, 1].map(|axis| [0, 1].map(|_| vec![0.0; [51 * 100, 50 * 101][axis] + 200]));
-        let evidence = Evidence { weights: summed(&grid, &weights), moved: Vec::new(), ends, spot_m: 0.07, grid };
-        let rect = Rect { bounds: [[-0.2, 0.2], [-0.2, 0.2]] };
-        let top = |stops: &[Stop]| run_on(rect, &evidence, stops, &drawn::CONFIG.front).bounds[1][1];
-        let flanks = |to: f64| [(0, -0.2, [-0.2, to]), (0, 0.2, [-0.2, to + 0.3])];
-        // To the end of the lower line, or of what may be its surface.
-        assert!((top(&flanks(0.6)) - 0.6).abs() < 0.03, "{}", top(&flanks(0.6)));
-        assert!((top(&flanks(1.4)) - 0.9).abs() < 0.03, "{}", top(&flanks(1.4)));
-        // To a line across; not beyond one that tells its side, nor along one flank alone.
-        let [left, right] = flanks(0.6);
-        assert!((top(&[left, right, (1, 0.4, [-0.2, 0.2])]) - 0.4).abs() < 0.03);
-        assert_eq!(top(&[left, right, (1, 0.2, [-0.2, 0.2])]), 0.2);
-        assert_eq!(top(&[left]), 0.2);
     }
 
     #[test]
