@@ -3,7 +3,7 @@
 
     RAYON_NUM_THREADS=2 paws batch sample.csv --out sample --jobs 2          # as many jobs as cores: a core each
     python3 examples/batch_cost.py sample --clips 6000                       # EPIC-Fields
-    python3 examples/batch_cost.py sample --seconds 148680 --clips 5000      # hours of video at hand, of which that many clips
+    python3 examples/batch_cost.py sample --seconds 148680 --clips 4000   # HD-EPIC: its seconds of video, of which that many clips
 
 SAMPLE is the folder of a finished batch. Its recordings should be like those of the large one: the size of their pictures and the
 frames a clip decide. Of every recording the seconds of its process (timings.csv) count as seconds of one core; the interval is

@@ -243,6 +243,21 @@ pub struct Twin {
     pub left_out: Vec<LeftOut>,
 }
 
+#[cfg(test)]
+impl Twin {
+    /// Such furniture of the usual density in an empty room.
+    pub(crate) fn of(furniture: Vec<Furniture>) -> Self {
+        Self {
+            name: "kitchen".to_owned(),
+            density_kg_per_m3: 600.0,
+            drives: Drives::default(),
+            furniture,
+            room: Vec::new(),
+            left_out: Vec::new(),
+        }
+    }
+}
+
 fn is_usual(drives: &Drives) -> bool {
     *drives == Drives::default()
 }

@@ -196,25 +196,13 @@ fn merged(mesh: &SurfaceMesh, edge: f32) -> SurfaceMesh {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::appearance::surface_mesh::tests::sheet;
 
     const VOXEL: f32 = 0.01;
 
     /// A square of a metre in steps of a voxel, with a hill of a hand's size in its middle.
     fn hill() -> SurfaceMesh {
-        const N: u32 = 100;
-        let at = |i: u32| {
-            let (x, y) = (0.01 * (i % (N + 1)) as f32, 0.01 * (i / (N + 1)) as f32);
-            let away = (x - 0.5).hypot(y - 0.5);
-            Local::new(x, y, (0.08 - away).max(0.0))
-        };
-        let quad = |i: u32| {
-            let a = i / N * (N + 1) + i % N;
-            [[a, a + 1, a + N + 2], [a, a + N + 2, a + N + 1]]
-        };
-        SurfaceMesh {
-            positions: (0..(N + 1) * (N + 1)).map(at).collect(),
-            triangles: (0..N * N).flat_map(quad).collect(),
-        }
+        sheet(100, |x, y| (0.08 - (x - 0.5).hypot(y - 0.5)).max(0.0))
     }
 
     fn area(mesh: &SurfaceMesh) -> f32 {

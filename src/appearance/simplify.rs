@@ -492,22 +492,11 @@ impl Work {
 mod tests {
     use super::*;
     use crate::appearance::local::Local;
+    use crate::appearance::surface_mesh::tests::sheet;
 
     /// A square of 1.5 m in the plane z = 0.3 x in steps of a centimetre.
     fn plane() -> SurfaceMesh {
-        const N: u32 = 150;
-        let at = |i: u32| {
-            let (x, y) = (0.01 * (i % (N + 1)) as f32, 0.01 * (i / (N + 1)) as f32);
-            Local::new(x, y, 0.3 * x)
-        };
-        let quad = |i: u32| {
-            let a = i / N * (N + 1) + i % N;
-            [[a, a + 1, a + N + 2], [a, a + N + 2, a + N + 1]]
-        };
-        SurfaceMesh {
-            positions: (0..(N + 1) * (N + 1)).map(at).collect(),
-            triangles: (0..N * N).flat_map(quad).collect(),
-        }
+        sheet(150, |x, _| 0.3 * x)
     }
 
     /// Whether only the square's own four sides are open.

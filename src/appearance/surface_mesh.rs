@@ -224,9 +224,25 @@ pub(super) fn root(parent: &mut [u32], mut vertex: u32) -> u32 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::appearance::fuse::VoxelBlock;
+
+    /// A square of so many centimetres in steps of one, at such a height above each of its points.
+    pub(in crate::appearance) fn sheet(n: u32, height: impl Fn(f32, f32) -> f32) -> SurfaceMesh {
+        let at = |i: u32| {
+            let (x, y) = (0.01 * (i % (n + 1)) as f32, 0.01 * (i / (n + 1)) as f32);
+            Local::new(x, y, height(x, y))
+        };
+        let quad = |i: u32| {
+            let a = i / n * (n + 1) + i % n;
+            [[a, a + 1, a + n + 2], [a, a + n + 2, a + n + 1]]
+        };
+        SurfaceMesh {
+            positions: (0..(n + 1) * (n + 1)).map(at).collect(),
+            triangles: (0..n * n).flat_map(quad).collect(),
+        }
+    }
 
     /// A ball of 0.23 m about a point in voxels of 2 cm.
     fn ball() -> Volume {

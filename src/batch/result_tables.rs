@@ -191,14 +191,7 @@ mod tests {
             ..clip("a")
         };
         let lost = Prediction { reason: Some("no hand, none".to_owned()), ..clip("b") };
-        let twin = Twin {
-            name: String::new(),
-            density_kg_per_m3: 600.0,
-            drives: crate::config::Drives::default(),
-            furniture: vec![],
-            room: vec![],
-            left_out: vec![],
-        };
+        let twin = Twin::of(Vec::new());
         let predictions = Predictions { predictions: vec![found, lost] };
         TwinFiles { predictions, twin, validation: Validation { joints: vec![] } }
     }

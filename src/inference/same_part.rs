@@ -348,6 +348,49 @@ mod tests {
         assert!(all(&[]).abs() < 1e-12);
     }
 
+    /// Nats of usual cases, as `docs/evidence.md` has them, to its last digit.
+    #[test]
+    fn usual_cases_are_as_the_documentation_says() {
+        let config = Config::default();
+        let model = Model::of(&config);
+        let is = |found: f64, said: f64| assert!((found - said).abs() <= 0.051, "{found} is not {said}");
+        // Hands alone.
+        let bare =
+            |x: f64, grip_std_m: f64| Sight { grip_std_m, face: None, name: Name::default(), ..sight([x, 0.0, 0.0]) };
+        let seen = [(0.0, 0.8), (0.05, 0.6), (0.1, 0.1), (0.15, -0.6), (0.2, -1.7), (0.25, -2.7), (0.4, -4.0)];
+        for (x, said) in seen {
+            is(odds(&bare(0.0, 0.03), &bare(x, 0.03)), said);
+        }
+        for (x, said) in [(0.0, -0.2), (0.2, -1.1), (0.4, -3.4)] {
+            is(odds(&bare(0.0, 0.03), &bare(x, 0.12)), said);
+        }
+        // Faces.
+        let here = face(Point::origin());
+        let beside = Face { right: Vector::y(), normal: Vector::x(), ..here };
+        let deeper = face(Point::new(0.0, -0.15, 0.0));
+        for (other, said) in [(here, 0.4), (beside, -1.6), (deeper, -1.1)] {
+            is(model.faces((here, other)), said);
+        }
+        // Outlines: the smaller one lies on the larger one, or beside it; and a grip 10 cm beside one.
+        let covered = |share: f64| nats(model.planes(0.0, Some(share))) - nats(model.planes(0.0, None));
+        is(covered(1.0), 2.3);
+        is(covered(0.0), -2.9);
+        is(model.holds((&here, &Rect { bounds: [[-0.2, 0.2]; 2] }), &bare(0.3, 0.03)), -1.2);
+        // Hinges and names.
+        let hinge =
+            |x: f64| Articulation { kind: JointKind::Revolute, axis: Vector::z(), origin: Point::new(x, 0.0, 0.0) };
+        for (x, said) in [(0.1, 1.2), (0.3, -1.3), (0.6, -3.0)] {
+            is(model.hinges(&hinge(0.0), &hinge(x)).unwrap(), said);
+        }
+        let name = |word, kind| Name { furniture: Some(word), kind: Some(kind) };
+        let drawer = name("drawer", JointKind::Prismatic);
+        for (other, said) in
+            [(drawer, 0.7), (name("rack", JointKind::Prismatic), -0.2), (name("oven", JointKind::Revolute), -2.1)]
+        {
+            is(model.names(drawer, other).unwrap(), said);
+        }
+    }
+
     #[test]
     fn what_was_looked_for_near_a_hand_that_was_seen_badly_says_little() {
         let hands = Hands { well: 1e-9, badly: 0.5 };

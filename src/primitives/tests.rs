@@ -81,14 +81,7 @@ pub(crate) fn twin_of(parts: Vec<Part>) -> Twin {
         .into_iter()
         .map(|part| Furniture { name: format!("{}_base", part.id), carcass: Vec::new(), part })
         .collect();
-    Twin {
-        name: "kitchen".to_owned(),
-        density_kg_per_m3: 600.0,
-        drives: crate::config::Drives::default(),
-        furniture,
-        room: Vec::new(),
-        left_out: Vec::new(),
-    }
+    Twin::of(furniture)
 }
 
 /// A door and, beside it, a drawer.

@@ -250,14 +250,7 @@ mod tests {
             joints: vec![drawer],
             surroundings: None,
         };
-        let twin = Twin {
-            name: String::new(),
-            density_kg_per_m3: 600.0,
-            drives: crate::config::Drives::default(),
-            furniture: vec![],
-            room: vec![],
-            left_out: vec![],
-        };
+        let twin = Twin::of(Vec::new());
         let rows = predictions(&scene, &twin).predictions;
         let (told, seen, lost) = (&rows[2], &rows[1], &rows[3]);
         assert_eq!((told.kind, told.range, told.joint_confidence), (Some(JointKind::Prismatic), Some(0.3), Some(0.8)));

@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 use paws_twin::import::formats;
 use tempfile::TempDir;
 
+use crate::common::skipped;
 use crate::readers::files::Files;
 use crate::readers::imports;
 use crate::readers::targets::{self, Target};
@@ -108,7 +109,9 @@ fn start(name: &str, folder: &Path) -> Output {
 #[test]
 #[ignore = "the other tests of this file start it, with the name of a reader"]
 fn one_reader() {
-    let (Ok(name), Some(folder)) = (std::env::var(READER), std::env::var_os(FOLDER)) else { return };
+    let (Ok(name), Some(folder)) = (std::env::var(READER), std::env::var_os(FOLDER)) else {
+        return skipped("a reader alone is tried where the other tests of fuzz_short start it");
+    };
     let folder = PathBuf::from(folder);
     let target = Target::named(&name).unwrap();
     let seeds = seeds(&name);

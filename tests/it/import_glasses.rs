@@ -12,7 +12,7 @@ use paws_twin::recording::Recording;
 use serde_json::{Value, json};
 
 use crate::common::SMALL;
-use crate::import::{apart, copy, depth_mm, edit, import, json, poses, refused, small, still, write};
+use crate::import::{apart, copy, costs_itself, depth_mm, edit, import, json, poses, refused, small, still, write};
 
 /// Frames that a test writes: hands come into view among them.
 pub const FRAMES: std::ops::Range<usize> = 14..38;
@@ -449,7 +449,7 @@ fn broken_recordings_of_glasses_are_named() {
             edit(&s.join("slam/closed_loop_trajectory.csv"), "qw_world_device", "qw");
         }),
     );
-    refused(
+    costs_itself(
         "no number",
         &[walk, "line 2: column tracking_timestamp_us", "not a number"],
         aria(|s| {

@@ -8,7 +8,7 @@ use paws_twin::math::{Point, Pose, Vector};
 use paws_twin::recording::Grid;
 use serde_json::{Value, json};
 
-use crate::import::{copy, depth_mm, edit, import, json, refused, small, still, write};
+use crate::import::{copy, costs_itself, depth_mm, edit, import, json, refused, small, still, write};
 use crate::import_glasses::{FRAMES, cut, hands, hands_are_back, pixels_are_back, poses_are_back};
 
 /// The recording's world with +Y up.
@@ -296,7 +296,7 @@ fn broken_recordings_of_headsets_are_named() {
             change(&dir.join("source"));
         }
     };
-    refused(
+    costs_itself(
         "cells",
         &["20240101_pv.txt: line 2", "cells, expected"],
         holo(|s| {
@@ -307,7 +307,7 @@ fn broken_recordings_of_headsets_are_named() {
         holo(|_| {})(d);
         cut(&d.join("source/20240101_head_hand_eye.csv"), 2000);
     });
-    refused(
+    costs_itself(
         "infinity",
         &["20240101_pv.txt: line 2: cell 2", "not finite"],
         holo(|s| {
@@ -326,7 +326,7 @@ fn broken_recordings_of_headsets_are_named() {
         write_quest(&d.join("source"), true);
         edit(&d.join("source/left_camera_mruk_intrinsics.json"), "\"focalLength\"", "\"focus\"");
     });
-    refused("a head", &["tracking.jsonl: line 1", "headMatrix"], |d| {
+    costs_itself("a head", &["tracking.jsonl: line 1", "headMatrix"], |d| {
         write_visionpro(&d.join("source"));
         edit(&d.join("source/tracking.jsonl"), "\"headMatrix\":[", "\"headMatrix\":[\"x\",");
     });

@@ -12,6 +12,30 @@ fn asked_for() -> Option<String> {
     std::env::var("PAWS_PYTHON").ok().filter(|v| !v.is_empty())
 }
 
+/// What a manifest says of release builds, without comments.
+fn release_profiles(manifest: &str) -> Vec<String> {
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(manifest)).unwrap();
+    let mut is_release = false;
+    let mut lines = Vec::new();
+    for line in text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#')) {
+        if line.starts_with('[') {
+            is_release = line.starts_with("[profile.release");
+        }
+        if is_release {
+            lines.push(line.to_owned());
+        }
+    }
+    lines
+}
+
+/// Else all dependencies are built twice.
+#[test]
+fn the_wheel_is_built_as_the_crate_is() {
+    let crate_s = release_profiles("Cargo.toml");
+    assert!(crate_s.len() > 3, "the scan found next to nothing: {crate_s:?}");
+    assert_eq!(crate_s, release_profiles("python/Cargo.toml"));
+}
+
 #[test]
 fn the_wheel_installs_and_its_scripts_run() {
     let Some(asked) = asked_for() else {
