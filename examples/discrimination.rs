@@ -367,10 +367,7 @@ fn play(args: &Args, tier: Tier, number: u64, noise_m: Option<f64>, config: &Con
 /// A true part in the form of the joints' file.
 fn entry(part: &OpenPart) -> Entry {
     let joint = part.articulation;
-    let kind = match joint.kind {
-        JointKind::Revolute => "revolute",
-        JointKind::Prismatic => "prismatic",
-    };
+    let kind = joint.kind.name();
     Entry {
         id: part.id.clone(),
         kind: Some(kind.to_owned()),

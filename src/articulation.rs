@@ -24,6 +24,15 @@ impl JointKind {
             Self::Prismatic => "slide",
         }
     }
+
+    /// The word of files and formats: "revolute" or "prismatic".
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Revolute => "revolute",
+            Self::Prismatic => "prismatic",
+        }
+    }
 }
 
 /// A joint: type, axis, origin. World frame, metres; positive motion opens.

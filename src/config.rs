@@ -15,6 +15,7 @@ mod hands;
 mod inference;
 mod localization;
 mod part;
+mod pictures;
 mod primitives;
 mod priors;
 mod reasoning;
@@ -36,6 +37,7 @@ pub use hands::*;
 pub use inference::*;
 pub use localization::*;
 pub use part::*;
+pub use pictures::*;
 pub use primitives::*;
 pub use priors::{Boards, Drives, Fronts, Handles, Hanging, Hung, Named, PriorSet, Priors, Ranges, Resistance};
 pub use reasoning::*;
@@ -121,6 +123,8 @@ pub struct Config {
     pub seed: u64,
     /// What is believed of furniture (ours).
     pub priors: Priors,
+    /// Ours.
+    pub pictures: Pictures,
     /// §3.1, §A.2.
     pub hands: Hands,
     /// §3.1, §A.3.
@@ -212,6 +216,7 @@ impl Config {
     pub fn rows(&self) -> Vec<Row> {
         let mut rows = Vec::new();
         self.priors.rows(&mut rows);
+        self.pictures.rows(&mut rows);
         self.hands.rows(&mut rows);
         self.localization.rows(&mut rows);
         self.geometry.rows(&mut rows);
@@ -270,6 +275,10 @@ impl Config {
         let pixel = &self.part.pixel;
         if pixel.before + pixel.behind.max(pixel.blocked) >= 1.0 {
             return Err("part.pixel: before and behind, and before and blocked, must add up to less than 1".to_owned());
+        }
+        let [least, most] = self.pictures.depth_per_distance;
+        if least >= most {
+            return Err("pictures.depth_per_distance must be two numbers, the smaller one first".to_owned());
         }
         if self.localization.min_views > self.localization.local_frames {
             return Err("localization.min_views is above local_frames: no voxel could ever be confident".to_owned());

@@ -11,13 +11,12 @@
 //! | [`files`] | URDF, MJCF, glTF and USD |
 
 use std::borrow::Cow;
-use std::path::Path;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{self, Config};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::export::{ExportContext, ExportFormat, ExportedFiles, FORMATS, Purpose};
 use crate::geometry::segments::Lsd;
 use crate::hands::{Trajectory, find};
@@ -27,13 +26,11 @@ use crate::pipeline::{self, Forgetful, LookStore, Progress, Scene};
 use crate::reasoning::Reasoner;
 use crate::reasoning::heuristic::Geometric;
 use crate::recording::Recording;
+use crate::recording::pictures::Picture;
 use crate::twin::Twin;
 use crate::validation::verdict::Hands;
 use crate::validation::{self, Validation};
 use crate::{appearance, export, feedback, fitting};
-
-/// Pictures go wrong one by one on a disk; more than this are an export gone wrong.
-const MOST_BAD_PICTURES: usize = 8;
 
 /// All that is made of a recording.
 #[derive(Debug, Clone)]
@@ -67,7 +64,9 @@ impl Made {
     /// What makes the whole recording unusable, and a configuration that no step could work with. A clip without an answer is
     /// data: its reason stands in [`pipeline::ClipResult::joint`].
     pub fn of(recording: &Recording, config: &Config) -> Result<Self> {
-        let recording = with_clips(recording, &config.hands);
+        config.check()?;
+        let recording = recording.clone().checked()?;
+        let recording = with_clips(&recording, &config.hands);
         let reasoner = Geometric::of(config);
         let (mut scene, mut lost) = scene(&recording, config, &reasoner, &|_, _, _| {}, &Forgetful)?;
         let up = recording.up();
@@ -97,10 +96,10 @@ pub fn with_clips<'a>(recording: &'a Recording, config: &config::Hands) -> Cow<'
     Cow::Owned(Recording { clips: find::interactions(recording, config), ..recording.clone() })
 }
 
-/// The joints of a recording, and what was left out on the way: the few pictures that cannot be decoded, with the reason.
+/// The joints of a recording, and what was left out on the way, as [`forgiving`] does.
 ///
 /// # Errors
-/// Those of [`pipeline::infer`], and a configuration that no step could work with.
+/// Those of [`pipeline::infer`] and of [`forgiving`], and a configuration that no step could work with.
 pub fn scene(
     recording: &Recording,
     config: &Config,
@@ -109,49 +108,38 @@ pub fn scene(
     store: &dyn LookStore,
 ) -> Result<(Scene, Vec<String>)> {
     config.check()?;
-    let mut recording = Cow::Borrowed(recording);
-    let mut lost = Vec::new();
-    loop {
-        match pipeline::infer_keeping(&recording, config, &Lsd, reasoner, progress, store) {
-            Ok(scene) => {
-                lost.sort();
-                return Ok((scene, lost));
-            }
-            Err(error) if lost.len() < MOST_BAD_PICTURES && has_picture(&recording, &error) => {
-                forget_picture(recording.to_mut(), &error);
-                lost.push(error.to_string());
-            }
-            Err(error) => return Err(error),
-        }
-    }
-}
-
-/// The file, or the picture by its name, that an error is about.
-fn subject(error: &Error) -> Option<&Path> {
-    match error {
-        Error::Format { path, .. } | Error::Io { path, .. } => Some(path),
-        _ => None,
-    }
-}
-
-/// Whether an error is about a picture of one frame.
-fn has_picture(recording: &Recording, error: &Error) -> bool {
-    let Some(name) = subject(error) else { return false };
-    recording.frames.iter().any(|frame| {
-        let f = &frame.files;
-        [&f.rgb, &f.depth, &f.normals, &f.mask, &f.segments].into_iter().any(|file| file.as_deref() == Some(name))
+    forgiving(recording, &config.pictures, |recording| {
+        pipeline::infer_keeping(recording, config, &Lsd, reasoner, progress, store)
     })
 }
 
-/// Leaves the picture that an error is about out of its frame.
-fn forget_picture(recording: &mut Recording, error: &Error) {
-    let Some(name) = subject(error) else { return };
-    for frame in &mut recording.frames {
-        let f = &mut frame.files;
-        for file in [&mut f.rgb, &mut f.depth, &mut f.normals, &mut f.mask, &mut f.segments] {
-            if file.as_deref() == Some(name) {
-                *file = None;
-            }
+/// What a step makes of a recording, and the damaged pictures that were left out, each with the reason: where it meets one, all
+/// pictures of that kind are decoded, and the step runs again without those that cannot be.
+///
+/// # Errors
+/// Those of the step, and more damaged pictures of one kind than the configuration allows.
+pub fn forgiving<T>(
+    recording: &Recording,
+    rules: &config::Pictures,
+    step: impl Fn(&Recording) -> Result<T>,
+) -> Result<(T, Vec<String>)> {
+    let mut recording = Cow::Borrowed(recording);
+    let mut lost = Vec::new();
+    loop {
+        let error = match step(&recording) {
+            Ok(made) => return Ok((made, lost)),
+            Err(error) => error,
+        };
+        let Some(kind) = Picture::ALL.into_iter().find(|kind| kind.is_meant(&recording, &error)) else {
+            return Err(error);
+        };
+        let damaged = kind.damaged(&recording, rules)?;
+        if damaged.is_empty() {
+            return Err(error);
+        }
+        for (frame, why) in damaged {
+            *kind.file_mut(&mut recording.to_mut().frames[frame].files) = None;
+            lost.push(why);
         }
     }
 }
@@ -230,13 +218,16 @@ pub fn replay(
     Ok((validation::validate(twin, &kept, up, config)?, lost))
 }
 
-/// What a twin looks like; `None` where there is nothing to see ([`appearance::lacking`] says why).
+/// What a twin looks like, `None` where there is nothing to see ([`appearance::lacking`] says why), and what was left out, as
+/// [`forgiving`] does.
 ///
 /// # Errors
-/// Pictures that cannot be decoded.
-pub fn look(recording: &Recording, scene: &Scene, twin: &Twin, config: &Config) -> Result<Option<Look>> {
-    let look = appearance::look(recording, scene, twin, &config.hands, &config.appearance)?;
-    Ok(export::dress::shows(twin, &look)?.then_some(look))
+/// Those of [`forgiving`].
+pub fn look(recording: &Recording, scene: &Scene, twin: &Twin, config: &Config) -> Result<(Option<Look>, Vec<String>)> {
+    let (look, lost) = forgiving(recording, &config.pictures, |recording| {
+        appearance::look(recording, scene, twin, &config.hands, &config.appearance)
+    })?;
+    Ok((export::dress::shows(twin, &look)?.then_some(look), lost))
 }
 
 /// A twin in all formats: names and bytes, those of its look (`look/`) last. `verdicts`: [`Validation::words`], or none.

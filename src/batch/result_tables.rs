@@ -1,7 +1,7 @@
 //! The tables of a batch, as CSV: one row a twin, a joint, a clip. Metres, radians, newtons; the recording's world.
 
 use super::journal::{JournalEntry, Status};
-use crate::articulation::{Articulation, JointKind};
+use crate::articulation::Articulation;
 use crate::evaluation::{Prediction, Predictions};
 use crate::report::accuracy::quoted;
 use crate::twin::Twin;
@@ -156,12 +156,8 @@ pub fn predictions(name: &str, made: &TwinFiles) -> Vec<Vec<String>> {
 /// Type, axis and origin; empty cells where there is none.
 fn articulation(phi: Option<&Articulation>) -> Vec<String> {
     let Some(phi) = phi else { return vec![String::new(); 7] };
-    let kind = match phi.kind {
-        JointKind::Revolute => "revolute",
-        JointKind::Prismatic => "prismatic",
-    };
     let numbers = phi.axis.iter().chain(phi.origin.coords.iter()).map(|v| number(Some(*v)));
-    std::iter::once(kind.to_owned()).chain(numbers).collect()
+    std::iter::once(phi.kind.name().to_owned()).chain(numbers).collect()
 }
 
 /// A number's cell; empty where there is none.
@@ -178,6 +174,7 @@ pub fn csv_line<S: AsRef<str>>(cells: &[S]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::articulation::JointKind;
     use crate::batch::journal::JournalKey;
     use crate::math::{Point, Vector};
 

@@ -210,7 +210,7 @@ fn entry(joint: &FoundJoint, scene: &JointScene) -> Result<Entry, String> {
     let range = joint.range.unwrap_or_else(|| [0.0, usual(joint, &part)]);
     Ok(Entry {
         id: joint.id.clone(),
-        kind: Some(if joint.kind == JointKind::Revolute { "revolute" } else { "prismatic" }.to_owned()),
+        kind: Some(joint.kind.name().to_owned()),
         axis: Some(joint.axis),
         origin: Some(joint.origin),
         range: Some(range),

@@ -166,10 +166,16 @@ pub fn make(
     let hands = make::joint_hands(&scene, &twin);
     let (validation, mut lost) = make::replay(&twin, &hands, &recording.up(), &config.validation)?;
     let look = match wishes.textures {
-        true => looked(&recording, &scene, &twin, config, &steps).unwrap_or_else(|error| {
-            lost.push(format!("textures: {error}"));
-            None
-        }),
+        true => match looked(&recording, &scene, &twin, config, &steps) {
+            Ok((look, unseen)) => {
+                lost.extend(unseen.into_iter().filter(|why| !unread.contains(why)));
+                look
+            }
+            Err(error) => {
+                lost.push(format!("textures: {error}"));
+                None
+            }
+        },
         false => None,
     };
     steps.report("writing", 0, 1);
@@ -196,13 +202,17 @@ pub fn make(
         _ => true,
     };
     let notes: Vec<FileNote> = file_notes().into_iter().filter(is_there).collect();
-    let pictured = match wishes.textures {
-        true => page_frames::frames(&recording, &scene, &twin, config).unwrap_or_else(|error| {
-            lost.push(format!("recorded frames of the page: {error}"));
-            Vec::new()
-        }),
-        false => Vec::new(),
-    };
+    let mut pictured = Vec::new();
+    if wishes.textures {
+        match make::forgiving(&recording, &config.pictures, |r| page_frames::frames(r, &scene, &twin, config)) {
+            Ok((frames, unseen)) => {
+                pictured = frames;
+                let told: Vec<String> = unread.iter().chain(&lost).cloned().collect();
+                lost.extend(unseen.into_iter().filter(|why| !told.contains(why)));
+            }
+            Err(error) => lost.push(format!("recorded frames of the page: {error}")),
+        }
+    }
     let origins = origin::read(&recording.dir);
     let around = PageContext { command: &command, files: &notes, frames: &pictured, origins: &origins };
     output.write("index.html", page::render(&scene, &twin, &validation, &glb, &around)?)?;
@@ -247,7 +257,7 @@ fn looked(
     twin: &Twin,
     config: &Config,
     steps: &Steps,
-) -> crate::error::Result<Option<Look>> {
+) -> crate::error::Result<(Option<Look>, Vec<String>)> {
     steps.report("textures", 0, 1);
     make::look(recording, scene, twin, config)
 }

@@ -44,11 +44,6 @@ block! {
         /// Grouping "voxels": least intersection over union of two clips of one joint. The paper has no number; on development
         /// seeds of three tiers this finds a third of the pairs, with one wrong one for three right ones.
         merge_voxel_iou: f64 = 0.1, "share", "ours";
-        /// Fronts of two clips of one part are one where their normals differ by less than this. Judgement.
-        merge_angle_deg: f64 = 25.0, "deg", "ours";
-        /// Fronts of two clips of one part are one where neither is deeper than this: two planes fitted to depth differ by a few
-        /// centimetres. Judgement.
-        merge_deeper_m: f64 = 0.08, "m", "ours";
         /// A hinge's line lies this near to its face: deeper or nearer lines are the carcass, the floor, other furniture. Judgement.
         at_face_m: f64 = 0.08, "m", "ours";
         /// A path of smaller extent is the trembling of a hand that holds still. Judgement.
@@ -234,6 +229,10 @@ block! {
         /// So often hinge and openings, then the outline with them, are fitted: more than the leaf that was known at first shows where
         /// the hinge is. A third round changes hardly a hinge.
         rounds: usize = 2, "-", "ours";
+        /// Two clips' joints of one part agree, and are averaged, where their axes differ by less than this.
+        agree_deg: f64 = 10.0, "deg", "ours";
+        /// The same of hinges: across their axis they are no farther apart.
+        agree_m: f64 = 0.12, "m", "ours";
         /// Without depth: what a clip believes in so much less than in its answer no other clip of its part brings back.
         believed_nats: f64 = 15.0, "nats", "ours";
     }
@@ -250,6 +249,11 @@ block! {
         odd: f64 = 0.02, "share", "ours";
         /// A clip that saw the part move counts so many times as much.
         moved: f64 = 2.0, "-", "ours";
+        /// Fronts of two clips of one part are one where their normals differ by less than this.
+        one_front_deg: f64 = 25.0, "deg", "ours";
+        /// Fronts of two clips of one part are one where neither is deeper than this: two planes fitted to depth differ by a few
+        /// centimetres.
+        one_front_m: f64 = 0.08, "m", "ours";
         /// Under the paper's rules, which ask no other clip's hand, a thin front may do: added to a face's support.
         thin_support: f64 = 0.2, "share", "ours";
     }

@@ -351,7 +351,8 @@ mod tests {
                 );
             }
             let from = entry["from"].as_str().unwrap();
-            assert!(["judgement", "measured", "source"].iter().any(|kind| from.starts_with(kind)), "{key}: {from}");
+            let grounds = ["judgement: ", "measured: ", "source: "].iter().find_map(|kind| from.strip_prefix(kind));
+            assert!(grounds.is_some_and(|on_what| on_what.len() > 5), "{key}: {from}");
             let allowed = ["value", "uninformed", "unit", "meaning", "from"];
             assert!(entry.keys().all(|k| allowed.contains(&k.as_str())), "{key}");
         }

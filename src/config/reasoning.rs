@@ -30,11 +30,6 @@ block! {
         effective_samples: f64 = 8.0, "-", "ours";
         /// Noise of a smoothed hand position when two explanations of it are compared.
         hand_std_m: f64 = 0.03, "m", "ours";
-        /// A hand that was recorded at fewer places refutes no joint by not being followed: between them it is not known.
-        least_samples: usize = 5, "samples", "ours";
-        /// A hand that is faster than this refutes no joint by not being followed: no arm that holds a door is, so that its times are
-        /// wrong.
-        hand_speed_max_m_per_s: f64 = 3.0, "m/s", "ours";
         /// Take the furniture's names from narrations and masks; false reads all of them as "it", for whatever asks for a name.
         /// A language model still sees what it is shown.
         use_names: bool = true, "-", "ours";

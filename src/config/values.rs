@@ -77,6 +77,8 @@ fn sensible(row: &Row) -> [f64; 2] {
         ("reasoning.evidence_temperature" | "inference.shared_errors", _) => [1.0, 100.0],
         // More is a veto.
         ("validation.refuted_nats", _) => [1e-3, 20.0],
+        // What one part is told of, no other one is.
+        ("inference.same_part.told_of" | "inference.same_part.joins", _) => [0.5, 1.0],
         (_, "weight") => [0.0, 1.0],
         (_, "share") => [1e-9, 1.0 - 1e-9],
         (_, "m") => [1e-4, 100.0],

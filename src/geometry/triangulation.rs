@@ -11,7 +11,7 @@ use crate::math::{Point, Vector, any_orthogonal, reject, unit};
 use crate::recording::Recording;
 
 /// What one view says about a line.
-pub(super) struct Sight {
+pub(super) struct LineView {
     plane: Vector,
     eye: Point,
     middle: Point,
@@ -21,7 +21,7 @@ pub(super) struct Sight {
     std: [f64; 4],
 }
 
-impl Sight {
+impl LineView {
     fn new(recording: &Recording, member: &LiftedSegment, rules: &config::Tracks) -> Self {
         let middle = member.segment.middle();
         let range = (middle - member.eye).norm();
@@ -48,7 +48,7 @@ impl Sight {
 }
 
 /// Least squares over some sights: the line and its information matrices (position, direction).
-fn common_line(sights: &[Sight], ids: &[usize]) -> Option<(Line, [Matrix3<f64>; 2])> {
+fn common_line(sights: &[LineView], ids: &[usize]) -> Option<(Line, [Matrix3<f64>; 2])> {
     let first = ids.iter().map(|&i| &sights[i]).min_by(|a, b| a.std[1].total_cmp(&b.std[1]))?;
     let mut position = Matrix3::zeros();
     let mut turning = Matrix3::zeros();
@@ -88,7 +88,7 @@ pub(super) fn triangulate(
     if views_of(members).len() < config.min_track_views {
         return None;
     }
-    let sights: Vec<Sight> = members.iter().map(|m| Sight::new(recording, m, &config.tracks)).collect();
+    let sights: Vec<LineView> = members.iter().map(|m| LineView::new(recording, m, &config.tracks)).collect();
     let pair = |ids: &[usize; 2]| -> Option<Line> {
         let [a, b] = ids.map(|i| &sights[i]);
         if a.plane.cross(&b.plane).norm() < config.tracks.least_sine {
@@ -116,7 +116,7 @@ pub(super) fn triangulate(
         return None;
     }
     let (line, [position, turning]) = common_line(&sights, &found.inliers)?;
-    let of = |f: &dyn Fn(&Sight) -> f64| {
+    let of = |f: &dyn Fn(&LineView) -> f64| {
         found.inliers.iter().map(|&i| f(&sights[i])).sum::<f64>() / found.inliers.len().max(1) as f64
     };
     let variance = of(&|s| s.plane.dot(&(line.point - s.eye)).powi(2));

@@ -3,6 +3,7 @@
 
 use rayon::prelude::*;
 
+use super::Every;
 use super::contact::view::View;
 use super::contact::{Flags, Widths, between, lasts};
 use super::contact::{alone, motion};
@@ -176,20 +177,9 @@ impl Candidate {
 
 impl Walk {
     fn of(recording: &Recording, side: Side, rules: &config::Found) -> Self {
-        let mut due = f64::NEG_INFINITY;
-        let samples: Vec<_> = recording
-            .hands
-            .iter()
-            .filter(|s| s.side == side)
-            .filter(|s| {
-                let time = recording.frames[s.frame].timestamp_secs;
-                let taken = time >= due - 1e-6;
-                if taken {
-                    due = time + rules.sample_secs;
-                }
-                taken
-            })
-            .collect();
+        let mut every = Every::secs(rules.sample_secs);
+        let own = recording.hands.iter().filter(|s| s.side == side);
+        let samples: Vec<_> = own.filter(|s| every.is_due(recording.frames[s.frame].timestamp_secs)).collect();
         let n = samples.len();
         Self {
             frames: samples.iter().map(|s| s.frame).collect(),
@@ -376,18 +366,8 @@ fn with_depth(recording: &Recording) -> Vec<usize> {
 
 /// Of frames in order those at least this far apart in time.
 fn spaced(recording: &Recording, frames: Vec<usize>, secs: f64) -> Vec<usize> {
-    let mut due = f64::NEG_INFINITY;
-    frames
-        .into_iter()
-        .filter(|&f| {
-            let time = recording.frames[f].timestamp_secs;
-            let taken = time >= due - 1e-6;
-            if taken {
-                due = time + secs;
-            }
-            taken
-        })
-        .collect()
+    let mut every = Every::secs(secs);
+    frames.into_iter().filter(|&f| every.is_due(recording.frames[f].timestamp_secs)).collect()
 }
 
 /// The nearest views before or after a moment that show a place without a hand near it.
@@ -429,11 +409,12 @@ fn changed_nats(recording: &Recording, walks: &[Walk], candidate: &Candidate, co
     let reach = rules.changed_around_m + (b - a).norm();
     let before = still_views(recording, &views, &middle, (from, true), rules);
     let after = still_views(recording, &views, &middle, (to, false), rules);
+    let decoded = |frames: &[usize]| frames.iter().filter_map(|&f| view(recording, f, config)).collect::<Vec<_>>();
+    let (before, after) = (decoded(&before), decoded(&after));
     let mut shares = Vec::new();
-    for &x in &before {
-        for &y in &after {
-            let (Some(x), Some(y)) = (view(recording, x, config), view(recording, y, config)) else { continue };
-            for (one, other) in [(&x, &y), (&y, &x)] {
+    for x in &before {
+        for y in &after {
+            for (one, other) in [(x, y), (y, x)] {
                 let off = one.depth_against(other, &middle, reach, rules.changed_step_m);
                 // A frame's depth is off by a factor of its own.
                 let Some(factor) = stats::median(&off.iter().map(|(seen, there)| seen / there).collect::<Vec<_>>())

@@ -45,6 +45,30 @@ pub struct Trajectory {
     pub ends_seen: [bool; 2],
 }
 
+/// Thins what comes in the order of time.
+pub(crate) struct Every {
+    secs: f64,
+    due_secs: f64,
+}
+
+impl Every {
+    /// One in so many seconds.
+    pub(crate) fn secs(secs: f64) -> Self {
+        Self { secs, due_secs: f64::NEG_INFINITY }
+    }
+
+    /// Whether what comes now is to be taken.
+    pub(crate) fn is_due(&mut self, time_secs: f64) -> bool {
+        /// Arithmetic: seconds; what comes at just this rate is taken whole.
+        const HAIR_SECS: f64 = 1e-6;
+        let is_due = time_secs >= self.due_secs - HAIR_SECS;
+        if is_due {
+            self.due_secs = time_secs + self.secs;
+        }
+        is_due
+    }
+}
+
 /// Standard deviation along the motion, metres, of a grip where the hand was seen to take hold or let go, or where it was lost on
 /// the way.
 #[must_use]

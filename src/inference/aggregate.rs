@@ -1,25 +1,17 @@
 //! Joints of clips of one part averaged to one (§3.4, §C.2).
 
-use super::mean_direction;
+use super::{mean_direction, near};
 use crate::articulation::{Articulation, JointKind};
-use crate::math::{Point, Vector, unsigned_angle};
+use crate::config::SceneRules;
+use crate::math::{Point, Vector};
 
-/// Consensus about `seed`: of the joints of its type those that agree with it (10 degrees, 12 cm) are averaged, directions
+/// Consensus about `seed`: of the joints of its type those that agree with it (`agree_deg`, `agree_m`) are averaged, directions
 /// by PCA, origins where they pass the seed's.
 #[must_use]
-pub fn consensus(seed: &Articulation, joints: &[(Articulation, f64)]) -> Articulation {
-    /// Definition: what agrees, degrees and metres.
-    const ANGLE_DEG: f64 = 10.0;
-    /// Definition: the same of hinges, metres.
-    const HINGE_M: f64 = 0.12;
+pub fn consensus(seed: &Articulation, joints: &[(Articulation, f64)], rules: &SceneRules) -> Articulation {
     let agreeing: Vec<(Articulation, f64)> = joints
         .iter()
-        .filter(|(j, w)| {
-            *w > 0.0
-                && j.kind == seed.kind
-                && unsigned_angle(&j.axis, &seed.axis) < ANGLE_DEG.to_radians()
-                && (j.kind == JointKind::Prismatic || seed.line().distance(&j.origin) < HINGE_M)
-        })
+        .filter(|(j, w)| *w > 0.0 && j.kind == seed.kind && near(seed, j, rules.agree_deg, rules.agree_m))
         .copied()
         .collect();
     let total: f64 = agreeing.iter().map(|(_, w)| w).sum();
@@ -37,7 +29,7 @@ pub fn consensus(seed: &Articulation, joints: &[(Articulation, f64)]) -> Articul
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::rotation;
+    use crate::math::{rotation, unsigned_angle};
 
     fn hinge(tilt: f64, x: f64) -> Articulation {
         Articulation {
@@ -55,7 +47,7 @@ mod tests {
             (hinge(0.0, 0.6), 1.0),
             (Articulation { kind: JointKind::Prismatic, ..hinge(0.0, 0.0) }, 5.0),
         ];
-        let merged = consensus(&joints[0].0, &joints);
+        let merged = consensus(&joints[0].0, &joints, &SceneRules::default());
         assert!(unsigned_angle(&merged.axis, &Vector::z()) < 1e-3);
         assert!(merged.line().distance(&Point::origin()) < 2e-3, "{merged:?}");
     }

@@ -13,7 +13,7 @@
 //! likelier than all else.
 
 use super::paper;
-use super::same_part::{Hands, Model, Name, Sight, Terms, averaged, log_odds, nats, together};
+use super::same_part::{HandOdds, Model, Name, Sight, Terms, averaged, log_odds, nats, together};
 use crate::articulation::Action;
 use crate::config::{Config, GroupingMethod, SamePart};
 use crate::math::Point;
@@ -340,7 +340,7 @@ fn turn(part: &Part, action: Action, rules: &SamePart) -> f64 {
 /// Odds of one part by the hands of an opening and the closing that follows: the part stands where it was left, so that its open
 /// ends tell, too, and that one hand went where the other one did. If all was seen well, the ends are compared that were seen better.
 /// If a closed end was not, the face and the hinge that were looked for near it say nothing, but the other end and the way do.
-fn handed_over(opened: &Held, closed: &Held, model: &Model) -> Hands {
+fn handed_over(opened: &Held, closed: &Held, model: &Model) -> HandOdds {
     let (a, b) = (&opened.sight, &closed.sight);
     let shut_m2 = model.variance(a.grip_std_m, b.grip_std_m);
     let open_m2 = model.variance(opened.open_std_m, closed.open_std_m);
@@ -351,7 +351,7 @@ fn handed_over(opened: &Held, closed: &Held, model: &Model) -> Hands {
     let ends = if open_m2 < shut_m2 { open.well } else { shut.well };
     // Where no end was seen by both hands, the way tells as much.
     let well = if way_m2 < shut_m2.min(open_m2) { 0.5 * (ends + way.well) } else { ends };
-    Hands { well, badly: (shut.badly + open.well + way.well) / 3.0 }
+    HandOdds { well, badly: (shut.badly + open.well + way.well) / 3.0 }
 }
 
 /// Shortest distance between the points of two paths; infinite where one has none.

@@ -206,7 +206,7 @@ pub fn together(own: &[&ClipJoint], paths: &[Vec<Point>], config: &config::Infer
         .map(|(i, j)| (i, explained(&j.joint)))
         .reduce(|best, next| if next.1 > best.1 { next } else { best })?;
     let all: Vec<(Articulation, f64)> = own.iter().map(|j| (j.joint, 1.0)).collect();
-    let joint = aggregate::consensus(&own.get(winner)?.joint, &all);
+    let joint = aggregate::consensus(&own.get(winner)?.joint, &all, &config.scene);
     let origin = match joint.kind {
         JointKind::Revolute => centroid(&paths.concat()).map_or(joint.origin, |c| joint.line().project(&c)),
         JointKind::Prismatic => joint.origin,

@@ -54,7 +54,7 @@ const KINDS: usize = 3;
 /// Evidence for one part.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Terms {
-    pub(super) hands: Hands,
+    pub(super) hands: HandOdds,
     /// Nats of each kind if the hands were seen well, none where it was not seen.
     pub(super) seen: [Option<f64>; KINDS],
     /// Nats of the names.
@@ -63,7 +63,7 @@ pub(super) struct Terms {
 
 /// Odds of one part by the hands.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Hands {
+pub(super) struct HandOdds {
     /// If they were seen as well as their standard deviations say.
     pub(super) well: f64,
     /// If one of them was seen badly.
@@ -113,19 +113,19 @@ impl<'a> Model<'a> {
 
     /// Odds of one part where two hands are such a distance apart: their density about one handle, against that of other parts'
     /// handles on the furniture around.
-    pub(super) fn near(&self, distance_m: f64, variance: f64) -> Hands {
+    pub(super) fn near(&self, distance_m: f64, variance: f64) -> HandOdds {
         let SamePart { elsewhere_m, parts_per_m2, .. } = *self.rules;
         let odds = |v: f64| (-0.5 * distance_m.powi(2) / v).exp() / (TAU * v * parts_per_m2);
-        Hands { well: odds(variance), badly: odds(variance.max(elsewhere_m.powi(2))) }
+        HandOdds { well: odds(variance), badly: odds(variance.max(elsewhere_m.powi(2))) }
     }
 
     /// Odds by the closed grips.
-    pub(super) fn grips(&self, a: &Sight, b: &Sight) -> Hands {
+    pub(super) fn grips(&self, a: &Sight, b: &Sight) -> HandOdds {
         self.near((a.grip - b.grip).norm(), self.variance(a.grip_std_m, b.grip_std_m))
     }
 
     /// All kinds of evidence, that of the hands given.
-    pub(super) fn terms(&self, a: &Sight, b: &Sight, hands: Hands) -> Terms {
+    pub(super) fn terms(&self, a: &Sight, b: &Sight, hands: HandOdds) -> Terms {
         let faces = a.face.zip(b.face);
         let outlines = faces.zip(a.outline.zip(b.outline)).and_then(|(faces, rects)| {
             let depth_m = coplanar(faces)?;
@@ -333,7 +333,7 @@ mod tests {
     #[test]
     fn sights_of_one_part_are_averaged_kind_by_kind() {
         let terms = |hands: f64, outline: Option<f64>| Terms {
-            hands: Hands { well: hands.exp(), badly: 0.0 },
+            hands: HandOdds { well: hands.exp(), badly: 0.0 },
             seen: [None, outline, None],
             names: None,
         };
@@ -393,7 +393,7 @@ mod tests {
 
     #[test]
     fn what_was_looked_for_near_a_hand_that_was_seen_badly_says_little() {
-        let hands = Hands { well: 1e-9, badly: 0.5 };
+        let hands = HandOdds { well: 1e-9, badly: 0.5 };
         let terms = Terms { hands, seen: [Some(-2.0), Some(-6.0), Some(-3.0)], names: None };
         let there = together(&[(1.0, terms)], 0.2);
         assert!((there - 0.1_f64.ln()).abs() < 1e-6, "{there}");

@@ -291,7 +291,7 @@ impl MjcfBuilder {
         for (link, portions) in self.model.links.iter_mut().zip(&self.portions) {
             let stated = link.mass_source == MassSource::Stated || c.from_shapes == Some(false);
             if !stated && link.name != WORLD && !portions.is_empty() {
-                weigh(link, portions);
+                set_mass(link, portions);
             }
         }
         if let Some(total) = c.total {
@@ -325,7 +325,7 @@ impl MjcfBuilder {
 }
 
 /// A link's mass, centre and inertia from its shapes, where all of these are known.
-fn weigh(link: &mut Link, portions: &[Portion]) {
+fn set_mass(link: &mut Link, portions: &[Portion]) {
     let assumed = portions.iter().any(|p| p.assumed);
     link.mass_source = if assumed { MassSource::Assumed } else { MassSource::Shapes };
     let Some(masses) = portions.iter().map(|p| p.mass).collect::<Option<Vec<f64>>>() else { return };

@@ -16,7 +16,7 @@ use crate::math::{Point, Vector, signed_angle};
 use crate::part::outline;
 use crate::part::outline::Stop;
 use crate::part::views::{self as open_state, View};
-use crate::reasoning::words::{Sight, Words};
+use crate::reasoning::words::{AskedClip, Words};
 use crate::reasoning::{self, Answer, PartShape, Reasoner};
 use crate::recording::narration::{self, Reading};
 use crate::recording::{AtWork, Clip, Recording};
@@ -129,7 +129,8 @@ pub(super) fn infer(
     let (Some(trajectory), Some(region)) = (&result.trajectory, &result.region) else { return Ok(result) };
 
     result.lines = lines_at(region, &result.views, seen, config);
-    result.words = reasoner.words(&Sight { recording, clip, region, views: &result.views, lines: &result.lines })?;
+    result.words =
+        reasoner.words(&AskedClip { recording, clip, region, views: &result.views, lines: &result.lines })?;
     let surface = surface(&seen.footage, region, &result.views, config);
     result.face = touched(&result, &reading, &surface, seen, config);
 

@@ -112,14 +112,15 @@ pub(super) fn by_trust(clips: &[ClipResult], members: &[usize], config: &Config)
     trusted.into_iter().map(|(clip, _)| clip).collect()
 }
 
+/// Whether two faces look the same way, as those of two clips of one front do.
+pub(super) fn face_alike(a: &Face, b: &Face, config: &Config) -> bool {
+    signed_angle(&a.normal, &b.normal) <= config.inference.closed.one_front_deg.to_radians()
+}
+
 /// Of the clips after the first one of `trusted` those that have a front of their own: each front once, the most trusted first.
 pub(super) fn other_fronts(clips: &[ClipResult], trusted: &[usize], config: &Config) -> Vec<usize> {
-    // Two planes fitted to one front differ by a few centimetres.
-    let deeper_m = config.inference.merge_deeper_m;
-    let one = |a: &Face, b: &Face| {
-        signed_angle(&a.normal, &b.normal) <= config.inference.merge_angle_deg.to_radians()
-            && a.coordinates(&b.center)[2].abs() <= deeper_m
-    };
+    let deeper_m = config.inference.closed.one_front_m;
+    let one = |a: &Face, b: &Face| face_alike(a, b, config) && a.coordinates(&b.center)[2].abs() <= deeper_m;
     let mut fronts: Vec<(usize, Face)> = Vec::new();
     for (clip, face) in trusted.iter().filter_map(|&c| Some((c, clips[c].face?))) {
         if !fronts.iter().any(|(_, other)| one(other, &face)) {

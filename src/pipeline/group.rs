@@ -83,23 +83,26 @@ impl Likely {
 }
 
 /// What a part's outline is told from, beside its joint.
-pub(super) struct Around {
+pub(super) struct Around<'a> {
     /// Points of the furniture, world.
     surface: Vec<Point>,
     /// Lines on its face.
     stops: Vec<outline::Stop>,
+    /// What all clips show of the part.
+    views: refit::Views<'a>,
 }
 
-impl Around {
-    /// Of the clip that saw the closed part best.
-    pub(super) fn of(group: &Group, best: usize) -> Self {
+impl<'a> Around<'a> {
+    /// `best`: the clip that saw the closed part best.
+    pub(super) fn of(group: &Group<'a>, best: usize) -> Self {
         let clip = &group.clips[best];
         let surface = clip
             .region
             .as_ref()
             .map_or_else(Vec::new, |region| clip::surface(&group.footage, region, &clip.views, group.config));
         let stops = clip.face.as_ref().map_or_else(Vec::new, |face| clip::edges_on(face, &clip.lines, group.config));
-        Self { surface, stops }
+        let views = refit::Views::of(&group.footage, &group.shown(), group.config);
+        Self { surface, stops, views }
     }
 }
 
@@ -165,14 +168,14 @@ fn by_depth(
     mut known: Known,
     rounds: usize,
 ) -> Known {
-    let Group { footage, config, .. } = *group;
+    let config = group.config;
     // A part of which no outline was seen to move: the piece of it around the grip.
     let mut rect = known.part.unwrap_or_else(|| outline::smallest(&config.part));
     let start = refit::Believed { joint: known.joint, hinge_m: config.reasoning.hand_std_m };
     let mut believed = start;
     for _ in 0..rounds {
         let closed = refit::Closed { face: *face, rect, surface: &around.surface };
-        let Some(fit) = refit::refitted(&footage, shown, &believed, &closed, config) else { break };
+        let Some(fit) = refit::refitted(shown, &around.views, &believed, &closed, config) else { break };
         // With the openings known better the part's outline is, too.
         let seen = front::Seen {
             face,

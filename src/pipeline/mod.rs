@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::articulation::{Action, Articulation, Outcome};
 use crate::config::{Config, LineMethod, RoomFrame};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::geometry::Rect;
 use crate::geometry::segments::{LiftedSegment, LineDetector, lift};
 use crate::geometry::{AxisCandidate, Face, LineTrack, ManhattanFrame, depth_scale, manhattan, tracks};
@@ -35,6 +35,7 @@ use crate::math::Point;
 use crate::reasoning::words::Words;
 use crate::reasoning::{Answer, Reasoner};
 use crate::recording::narration;
+use crate::recording::pictures::check_depth;
 use crate::recording::sketch::Sketch;
 use crate::recording::{AtWork, Clip, DepthFactors, Recording, Surfaces, Videos};
 pub use looks::{Forgetful, LookStore};
@@ -258,7 +259,7 @@ pub fn infer_keeping(
     progress: Progress,
     store: &dyn LookStore,
 ) -> Result<Scene> {
-    check_depth(recording)?;
+    check_depth(recording, &config.pictures)?;
     // The one place where names are taken away: whatever reads them later reads these clips.
     let unnamed = (!config.reasoning.use_names).then(|| narration::without_names(recording));
     let recording = unnamed.as_ref().unwrap_or(recording);
@@ -469,53 +470,6 @@ fn look_at(
 fn sort_unique(frames: &mut Vec<usize>) {
     frames.sort_unstable();
     frames.dedup();
-}
-
-/// Zero depth everywhere, or depth in another unit than the hands, is an export gone wrong, not a scene; a few frames tell.
-fn check_depth(recording: &Recording) -> Result<()> {
-    let with_depth: Vec<usize> =
-        (0..recording.frames.len()).filter(|&f| recording.frames[f].files.depth.is_some()).collect();
-    if with_depth.is_empty() {
-        return Ok(());
-    }
-    // Hands tell what depth should be where they are: a ratio far from 1 is a unit, not an error of estimation.
-    let mut ratios = Vec::new();
-    let mut any = false;
-    let with_hand: Vec<&crate::recording::HandSample> =
-        recording.hands.iter().filter(|h| recording.frames[h.frame].files.depth.is_some()).collect();
-    for i in 0..with_hand.len().min(8) {
-        let hand = with_hand[i * with_hand.len() / with_hand.len().min(8)];
-        let Some(depth) = recording.depth(hand.frame)? else { continue };
-        any |= depth.data.iter().any(|z| *z > 0.0);
-        let local = recording.frames[hand.frame].world_from_camera.inverse() * hand.grasp();
-        let seen = recording.camera_of(hand.frame).project(&local).and_then(|(u, v)| depth.nearest(u, v));
-        ratios.extend(seen.filter(|z| *z > 0.0).map(|z| f64::from(z) / local.z));
-    }
-    if let Some(ratio) = crate::math::stats::median(&ratios).filter(|r| !(0.2..8.0).contains(r)) {
-        return Err(Error::Recording {
-            path: recording.dir.clone(),
-            faults: vec![format!(
-                "depth: where hands are, depth is {ratio:.3} times their distance: hands and depth disagree on the unit; depth \
-                 must be 16-bit millimetres, hands metres"
-            )],
-        });
-    }
-    if any {
-        return Ok(());
-    }
-    for i in 0..with_depth.len().min(8) {
-        let frame = with_depth[i * with_depth.len() / with_depth.len().min(8)];
-        if recording.depth(frame)?.is_some_and(|d| d.data.iter().any(|z| *z > 0.0)) {
-            return Ok(());
-        }
-    }
-    Err(Error::Recording {
-        path: recording.dir.clone(),
-        faults: vec![
-            "depth: every value is 0 = no value; depth must be 16-bit PNG in millimetres (were metres written as integers?)"
-                .to_owned(),
-        ],
-    })
 }
 
 /// Views for the room's frame: those with a normals file first, at most so many as are enough for it.

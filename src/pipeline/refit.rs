@@ -38,6 +38,25 @@ pub(super) struct Closed<'a> {
     pub(super) surface: &'a [Point],
 }
 
+/// What each clip of a part shows of it, in the order of the clips.
+pub(super) struct Views<'a> {
+    /// Of its open state.
+    open: Vec<Vec<views::View<'a>>>,
+    /// Of its closed state, while nothing else was moved.
+    closed: Vec<Vec<views::View<'a>>>,
+}
+
+impl<'a> Views<'a> {
+    pub(super) fn of(footage: &Footage<'a>, shown: &[(&ClipResult, &Trajectory)], config: &'a Config) -> Self {
+        let Footage { recording, sketches, .. } = *footage;
+        let open = |clip: &ClipResult, t| views::open_views(recording, sketches, &clip.clip, t, &config.part);
+        Self {
+            open: shown.iter().map(|(clip, t)| open(clip, t)).collect(),
+            closed: shown.iter().map(|(clip, t)| closed_views(footage, clip, t, config)).collect(),
+        }
+    }
+}
+
 /// A joint and how well its hinge is believed to be known along the front before the depth of the open states is looked at,
 /// a standard deviation in metres.
 #[derive(Debug, Clone, Copy)]
@@ -68,23 +87,19 @@ impl Believed {
 
 /// The hinge and the openings that the depth of the open states tells. `None` where they were not seen.
 pub(super) fn refitted<'a>(
-    footage: &Footage<'a>,
     shown: &[(&ClipResult, &Trajectory)],
+    shows: &Views<'a>,
     believed: &Believed,
     closed: &Closed,
     config: &'a Config,
 ) -> Option<Refitted<'a>> {
     let rules = &config.inference.states;
     let Closed { face, rect, .. } = closed;
-    let Footage { recording, sketches, .. } = *footage;
     let joint = &believed.joint;
     let prior = openings::Prior { hinge_m: believed.hinge_m, board_m: config.priors.boards.thickness_m };
-    let views: Vec<Vec<views::View>> =
-        shown.iter().map(|(clip, t)| views::open_views(recording, sketches, &clip.clip, t, &config.part)).collect();
-    let still: Vec<Vec<views::View>> = shown.iter().map(|(clip, t)| closed_views(footage, clip, t, config)).collect();
     let states: Vec<OpenState> = shown
         .iter()
-        .zip(views.iter().zip(&still))
+        .zip(shows.open.iter().zip(&shows.closed))
         .map(|((_, t), (views, closed))| OpenState {
             grip: t.closed_grip(),
             grip_std: GripStd::of(t, &config.hands.grips),
@@ -125,7 +140,7 @@ pub(super) fn refitted<'a>(
         moved_std: ends.iter().zip(&begins).map(|(end, begin)| shared.sqrt() * end.std.hypot(begin.std)).collect(),
     };
     let openings = fit.openings.iter().flatten().map(|o| o.value).collect();
-    let views = views.into_iter().flatten().collect();
+    let views = shows.open.iter().flatten().copied().collect();
     let widest = ends.iter().map(|end| end.value).fold(0.0, f64::max);
     Some(Refitted { joint: fit.joint, views, openings, ranges, widest, depth })
 }

@@ -160,7 +160,12 @@ fn regrouped(
                 members
             })
             .collect();
-        joints = alone.iter().flatten().map(|&j| joints[j].clone()).chain(again(&groups)).collect();
+        let merged = again(&groups);
+        if merged.len() < groups.len() {
+            // Clips that tell nothing together keep what they told alone.
+            return joints;
+        }
+        joints = alone.iter().flatten().map(|&j| joints[j].clone()).chain(merged).collect();
         joints.sort_by_key(|(members, _)| members.first().map(|&c| (clips[c].clip.start_frame, c)));
     }
 }
@@ -173,8 +178,9 @@ fn front_of<'a>(
     named: Option<&'a narration::Reading>,
     config: &Config,
 ) -> Option<Sight<'a>> {
-    let mut trajectories = members.iter().filter_map(|&c| clips[c].trajectory.as_ref());
-    let seen = trajectories.any(Trajectory::closed_end_seen);
+    // The grip is one clip's, and so is how well it was seen.
+    let mut hands = members.iter().filter_map(|&c| clips[c].trajectory.as_ref());
+    let seen = hands.any(|hand| hand.closed_grip() == joint.grip && hand.closed_end_seen());
     Some(Sight {
         grip: joint.grip,
         grip_std_m: hands::grip_std_m(seen, &config.hands.grips),
@@ -205,7 +211,7 @@ fn merged(
 /// One part's joint, and how else it could move.
 fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
     let Group { clips, members, config, .. } = *group;
-    let (look, hypotheses) = method::of(config).part(group, reasoner)?;
+    let (judged, hypotheses) = method::of(config).part(group, reasoner)?;
     let answer = hypotheses.first()?.clone();
     Some(SceneJoint {
         id: String::new(),
@@ -217,15 +223,80 @@ fn merge_group(group: &Group, reasoner: &dyn Reasoner) -> Option<SceneJoint> {
             .iter()
             .find_map(|&c| narration::read(&clips[c].clip).furniture)
             .or_else(|| members.iter().find_map(|&c| clips[c].words.as_ref()?.furniture.clone())),
-        type_probability: look.type_probability,
-        joint_probability: look.joint_probability,
+        type_probability: judged.type_probability,
+        joint_probability: judged.joint_probability,
         uncertainty: answer.uncertainty,
-        grip: look.grip,
-        face: group.front(look.best, &answer.joint, &look.grip),
+        grip: judged.grip,
+        face: group.front(judged.best, &answer.joint, &judged.grip),
         part: answer.part,
         observed_range: answer.observed_range,
         moved: answer.moved,
         // Without a posterior there are no shares to tell.
-        hypotheses: if look.joint_probability.is_some() { hypotheses } else { Vec::new() },
+        hypotheses: if judged.joint_probability.is_some() { hypotheses } else { Vec::new() },
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::articulation::{Articulation, JointKind};
+    use crate::geometry::{Face, Rect};
+    use crate::math::Vector;
+
+    fn face() -> Face {
+        let [right, up, normal] = [Vector::x(), Vector::z(), -Vector::y()];
+        Face { center: Point::origin(), right, up, normal, extent: [[-0.5, 0.5]; 2], support: 0.5 }
+    }
+
+    fn joint(clip: usize) -> SceneJoint {
+        SceneJoint {
+            id: String::new(),
+            joint: Articulation { kind: JointKind::Prismatic, axis: -Vector::y(), origin: Point::origin() },
+            clips: vec![clip.to_string()],
+            told: Vec::new(),
+            furniture: None,
+            type_probability: None,
+            joint_probability: None,
+            uncertainty: None,
+            grip: Point::new(clip as f64, 0.0, 0.0),
+            face: Some(face()),
+            part: Some(Rect { bounds: [[-0.2, 0.2]; 2] }),
+            observed_range: 0.0,
+            moved: Vec::new(),
+            hypotheses: Vec::new(),
+        }
+    }
+
+    /// Clips with a hand at `(clip, 0, 0)` that is lost in the second one.
+    fn clips() -> Vec<ClipResult> {
+        let mut all = told::tests::clips(&[("open it", true), ("open it", true)]);
+        for (i, clip) in all.iter_mut().enumerate() {
+            let hand = clip.trajectory.as_mut().unwrap();
+            hand.samples[0].smoothed = Point::new(i as f64, 0.0, 0.0);
+            hand.ends_seen = [i == 0; 2];
+        }
+        all
+    }
+
+    #[test]
+    fn a_grip_is_as_sure_as_the_hand_of_its_own_clip() {
+        let (clips, config) = (clips(), Config::default());
+        let std_m = |of: usize| front_of(&[0, 1], &joint(of), &clips, None, &config).unwrap().grip_std_m;
+        assert_eq!(std_m(0), config.hands.grips.seen_std_m);
+        assert_eq!(std_m(1), config.hands.grips.lost_std_m);
+    }
+
+    #[test]
+    fn parts_that_turn_out_to_be_one_are_judged_again_and_kept_where_that_tells_nothing() {
+        let (clips, config) = (clips(), Config::default());
+        let one = |clip: usize| SceneJoint { grip: Point::origin(), ..joint(clip) };
+        let two = || vec![(vec![0], one(0)), (vec![1], one(1))];
+        let again = |groups: &[Vec<usize>]| {
+            assert_eq!(groups, [vec![0, 1]]);
+            vec![(vec![0, 1], one(0))]
+        };
+        assert_eq!(regrouped(two(), &clips, again, &config).len(), 1);
+        let kept = regrouped(two(), &clips, |_| Vec::new(), &config);
+        assert_eq!(kept.iter().map(|(members, _)| members.clone()).collect::<Vec<_>>(), [vec![0], vec![1]]);
+    }
 }

@@ -50,7 +50,7 @@ pub(super) fn infer(
     let all = |room: Option<&ManhattanFrame>| -> Vec<ClipResult> {
         let each = recording.clips.par_iter().zip(&followed).zip(&looked.views);
         each.map(|((clip, followed), views)| {
-            let around = Sight { recording, looked: &looked, views, room };
+            let around = ClipViews { recording, looked: &looked, views, room };
             of_clip(clip, followed, &around, reasoner, config)
         })
         .collect()
@@ -150,14 +150,14 @@ fn room_of_fronts(clips: &[ClipResult], up: &Vector, rules: &RoomFrame) -> Optio
 }
 
 /// What a clip is judged with.
-struct Sight<'a> {
+struct ClipViews<'a> {
     recording: &'a Recording,
     looked: &'a Looked,
     views: &'a [usize],
     room: Option<&'a ManhattanFrame>,
 }
 
-impl Sight<'_> {
+impl ClipViews<'_> {
     /// Up, as in [`clip::upward`].
     fn up(&self, config: &Config) -> Vector {
         clip::upward(self.recording, self.room, config)
@@ -199,7 +199,13 @@ impl Sight<'_> {
 }
 
 /// All fronts of a clip with the axes on each, and which of them the hand is likeliest to have moved.
-fn of_clip(clip: &Clip, followed: &Followed, sight: &Sight, reasoner: &dyn Reasoner, config: &Config) -> ClipResult {
+fn of_clip(
+    clip: &Clip,
+    followed: &Followed,
+    sight: &ClipViews,
+    reasoner: &dyn Reasoner,
+    config: &Config,
+) -> ClipResult {
     let hand = match &followed.hand {
         Outcome::Found(hand) => hand,
         Outcome::Abstained(reason) => return ClipResult::unanswered(clip.clone(), reason.clone()),

@@ -8,7 +8,7 @@ use super::answers::{self, Motion};
 use super::heuristic::Geometric;
 use super::marks::{self, Image, Mark};
 use super::prompts::{AxisChoice, MotionType, Prompts, Summary};
-use super::words::{LineVote, Sight, Words};
+use super::words::{AskedClip, LineVote, Words};
 use super::{Answer, Question, Reasoner};
 use crate::articulation::JointKind;
 use crate::config;
@@ -32,7 +32,7 @@ pub struct Asking<'a> {
 }
 
 impl Reasoner for Asking<'_> {
-    fn words(&self, sight: &Sight) -> Result<Option<Words>> {
+    fn words(&self, sight: &AskedClip) -> Result<Option<Words>> {
         self.ask(sight)
     }
 
@@ -53,7 +53,7 @@ impl Asking<'_> {
     ///
     /// # Errors
     /// Images that cannot be decoded, and what [`LanguageModel::ask`] calls an error.
-    pub fn ask(&self, sight: &Sight) -> Result<Option<Words>> {
+    pub fn ask(&self, sight: &AskedClip) -> Result<Option<Words>> {
         let frames = self.frames(sight);
         let mut words = Words::default();
         let notes = in_order(frames.len(), self.at_once, |i| self.about_frame(sight, frames[i], i + 1, frames.len()))?;
@@ -82,7 +82,13 @@ impl Asking<'_> {
         Ok((!frames.is_empty() || !views.is_empty()).then_some(words))
     }
 
-    fn question(&self, sight: &Sight, name: &str, text: String, pictures: Vec<EncodedPicture>) -> vlm::PictureQuestion {
+    fn question(
+        &self,
+        sight: &AskedClip,
+        name: &str,
+        text: String,
+        pictures: Vec<EncodedPicture>,
+    ) -> vlm::PictureQuestion {
         let reasoning = &self.geometric.reasoning;
         vlm::PictureQuestion {
             purpose: format!("{}/{name}", sight.clip.clip),
@@ -97,7 +103,7 @@ impl Asking<'_> {
     }
 
     /// Frames of the clip to show, evenly spread (§A.6).
-    fn frames(&self, sight: &Sight) -> Vec<usize> {
+    fn frames(&self, sight: &AskedClip) -> Vec<usize> {
         let seen: Vec<usize> = (sight.clip.start_frame..=sight.clip.end_frame)
             .filter(|&f| sight.recording.frames.get(f).is_some_and(|f| f.files.rgb.is_some()))
             .collect();
@@ -105,7 +111,7 @@ impl Asking<'_> {
     }
 
     /// Views in which to ask for the hinge, evenly spread.
-    fn views(&self, sight: &Sight) -> Vec<usize> {
+    fn views(&self, sight: &AskedClip) -> Vec<usize> {
         if sight.lines.is_empty() {
             Vec::new()
         } else {
@@ -114,7 +120,7 @@ impl Asking<'_> {
     }
 
     /// How does the part move, as far as one frame tells?
-    fn about_frame(&self, sight: &Sight, frame: usize, number: usize, total: usize) -> Result<Option<String>> {
+    fn about_frame(&self, sight: &AskedClip, frame: usize, number: usize, total: usize) -> Result<Option<String>> {
         let Some(image) = sight.recording.rgb(frame)? else { return Ok(None) };
         let text = self.prompts.motion_type(&MotionType {
             frame_number: number,
@@ -127,7 +133,7 @@ impl Asking<'_> {
     }
 
     /// How does it move in the whole clip, given what was said of its frames?
-    fn about_clip(&self, sight: &Sight, notes: &[Option<String>]) -> Result<Motion> {
+    fn about_clip(&self, sight: &AskedClip, notes: &[Option<String>]) -> Result<Motion> {
         // A note is a line; a model that wrote an essay is cut short.
         let most = self.geometric.reasoning.vlm_note_chars;
         let line = |note: &Option<String>| -> String {
@@ -146,7 +152,7 @@ impl Asking<'_> {
     }
 
     /// Which of the lines of one view could be the hinge? `None` without lines, or without a usable answer.
-    fn about_view(&self, sight: &Sight, view: usize, furniture: Option<&str>) -> Result<Option<ViewVote>> {
+    fn about_view(&self, sight: &AskedClip, view: usize, furniture: Option<&str>) -> Result<Option<ViewVote>> {
         let Some((image, shown)) = marked_view(sight, view, &self.geometric.reasoning)? else {
             return Ok(None);
         };
@@ -170,7 +176,7 @@ impl Asking<'_> {
 ///
 /// # Errors
 /// Images that cannot be decoded.
-pub fn marked_view(sight: &Sight, view: usize, config: &config::Reasoning) -> Result<Option<(Image, Vec<usize>)>> {
+pub fn marked_view(sight: &AskedClip, view: usize, config: &config::Reasoning) -> Result<Option<(Image, Vec<usize>)>> {
     let recording = sight.recording;
     let Some(image) = recording.rgb(view)? else { return Ok(None) };
     let (depth, mask) = (recording.depth(view)?, recording.mask(view)?);
@@ -201,7 +207,7 @@ pub fn marked_view(sight: &Sight, view: usize, config: &config::Reasoning) -> Re
 
 /// One view of the scene, decoded.
 struct Eye<'a> {
-    sight: &'a Sight<'a>,
+    sight: &'a AskedClip<'a>,
     view: usize,
     depth: Option<&'a Grid<f32>>,
     mask: Option<&'a Grid<u8>>,

@@ -117,7 +117,7 @@ pub trait Reasoner: Sync {
     ///
     /// # Errors
     /// What must end the run: see [`crate::vlm::LanguageModel::ask`].
-    fn words(&self, _sight: &words::Sight) -> Result<Option<words::Words>> {
+    fn words(&self, _sight: &words::AskedClip) -> Result<Option<words::Words>> {
         Ok(None)
     }
 

@@ -74,7 +74,7 @@ impl Words {
 
 /// What a model may look at.
 #[derive(Debug, Clone, Copy)]
-pub struct Sight<'a> {
+pub struct AskedClip<'a> {
     /// The recording.
     pub recording: &'a Recording,
     /// The clip.
@@ -87,7 +87,7 @@ pub struct Sight<'a> {
     pub lines: &'a [LineTrack],
 }
 
-impl Sight<'_> {
+impl AskedClip<'_> {
     /// What the masks call the furniture at the hand.
     #[must_use]
     pub fn fixture(&self) -> Option<&str> {

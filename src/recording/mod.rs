@@ -16,6 +16,7 @@ pub mod narration;
 pub mod npy;
 pub mod origin;
 pub mod people;
+pub(crate) mod pictures;
 mod read;
 pub(crate) mod reconstruction;
 pub mod segments;

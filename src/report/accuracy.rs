@@ -355,7 +355,7 @@ pub fn csv(report: &EvaluationReport) -> String {
 fn csv_row(c: &ClipReport) -> Vec<String> {
     let number = |v: Option<f64>| v.map_or_else(String::new, |v| v.to_string());
     let word = |v: Option<&String>| v.cloned().unwrap_or_default();
-    let kind = |k: JointKind| if k == JointKind::Revolute { "revolute" } else { "prismatic" }.to_owned();
+    let kind = |k: JointKind| k.name().to_owned();
     let action = c.action.map_or("", |a| if a == Action::Open { "open" } else { "close" });
     let mut row = vec![
         c.recording.clone(),

@@ -112,6 +112,50 @@ fn a_picture_that_is_not_held_is_named_and_costs_only_itself() {
 }
 
 #[test]
+fn a_few_damaged_pictures_cost_themselves_and_many_the_recording() {
+    let folder = Recording::open(SMALL.path()).unwrap();
+    let memory = Recording::from_memory(held(&folder)).unwrap();
+    let looked_at = Made::of(&memory, &Config::default()).unwrap().scene.clips[0].closed_frames.clone();
+    assert!(looked_at.len() > 2);
+    // Two kinds of pictures, in frames that hands and surfaces are told from and in others.
+    let mut few = memory.clone();
+    let last = few.frames.len() - 1;
+    for frame in [looked_at[0], looked_at[2], last] {
+        few.frames[frame].files.mask = Some(format!("mask {frame}").into());
+    }
+    for frame in [looked_at[1], last - 1] {
+        few.frames[frame].files.depth = Some(format!("depth {frame}").into());
+    }
+    let made = Made::of(&few, &Config::default()).unwrap();
+    assert_eq!(made.lost.iter().filter(|why| why.starts_with("mask ")).count(), 3, "{:?}", made.lost);
+    assert_eq!(made.lost.iter().filter(|why| why.starts_with("depth ")).count(), 2, "{:?}", made.lost);
+    assert_eq!(made.scene.joints[0].joint.kind, JointKind::Revolute);
+    // What is lost to the joints is lost to the look, and to no more.
+    let (look, unseen) = make::look(&few, &made.scene, &made.twin, &Config::default()).unwrap();
+    assert!(look.is_some_and(|look| !look.room.is_empty()));
+    assert!(!unseen.is_empty() && unseen.iter().all(|why| made.lost.contains(why)), "{unseen:?}");
+
+    let mut many = memory;
+    let count = many.frames.len();
+    for (i, frame) in many.frames.iter_mut().enumerate() {
+        if i % 3 == 0 {
+            frame.files.depth = Some(format!("depth {i}").into());
+        }
+    }
+    let error = Made::of(&many, &Config::default()).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains(&format!("depth: {} of {count} cannot be read", count.div_ceil(3))), "{error}");
+    assert!(error.contains("depth 0: memory: "), "{error}");
+}
+
+#[test]
+fn a_recording_that_nobody_checked_is_checked() {
+    let mut wrong = Recording::open(SMALL.path()).unwrap();
+    wrong.hands[0].frame = usize::MAX;
+    let error = Made::of(&wrong, &Config::default()).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("frame 18446744073709551615"), "{error}");
+}
+
+#[test]
 fn a_played_kitchen_needs_no_folder() {
     let options = SynthOptions { seed: 3, tier: Tier::Clean, width: 160, parts: 1 };
     let recording = Recorded::new(&options).unwrap().recording().unwrap();
@@ -123,7 +167,8 @@ fn a_played_kitchen_needs_no_folder() {
     let made = Made::of(&recording, &Config::default()).unwrap();
     assert_eq!(made.scene.joints[0].joint.kind, JointKind::Revolute);
     assert_eq!(made.validation.joints[0].verdict, Verdict::Pass);
-    let look = make::look(&recording, &made.scene, &made.twin, &Config::default()).unwrap();
+    let (look, lost) = make::look(&recording, &made.scene, &made.twin, &Config::default()).unwrap();
+    assert!(lost.is_empty());
     assert!(look.is_some_and(|look| !look.room.is_empty()));
 }
 

@@ -11,7 +11,7 @@ use paws_twin::error::Result;
 use paws_twin::geometry::LineTrack;
 use paws_twin::math::unsigned_angle;
 use paws_twin::reasoning::heuristic::Geometric;
-use paws_twin::reasoning::words::{LineVote, Sight, Words};
+use paws_twin::reasoning::words::{AskedClip, LineVote, Words};
 use paws_twin::reasoning::{Answer, Question, Reasoner};
 
 /// How a simulated model errs.
@@ -99,7 +99,7 @@ pub struct Simulated<'a> {
 }
 
 impl Reasoner for Simulated<'_> {
-    fn words(&self, sight: &Sight) -> Result<Option<Words>> {
+    fn words(&self, sight: &AskedClip) -> Result<Option<Words>> {
         let Some(joint) = self.truth.get(&sight.clip.clip) else { return Ok(None) };
         // Every clip its own errors, the same on every run.
         let seed = sight.clip.clip.bytes().fold(self.seed, |seed, b| seed.wrapping_mul(31).wrapping_add(u64::from(b)));

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::{Flags, Span, Track, lasts, motion};
 use crate::config;
+use crate::hands::Every;
 use crate::math::{Point, stats};
 
 /// Whether nothing was seen around any hand.
@@ -91,17 +92,8 @@ fn best_span(
 
 /// Samples at which a hold may begin or end: all of a slow track, every so often of a fast one.
 fn tried(times: &[f64], every_secs: f64) -> Vec<bool> {
-    let mut due = f64::NEG_INFINITY;
-    times
-        .iter()
-        .map(|&time| {
-            let is_due = time >= due - 1e-6;
-            if is_due {
-                due = time + every_secs;
-            }
-            is_due
-        })
-        .collect()
+    let mut every = Every::secs(every_secs);
+    times.iter().map(|&time| every.is_due(time)).collect()
 }
 
 /// What a stretch says by being one line or arc, nats.

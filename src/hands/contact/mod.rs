@@ -12,7 +12,7 @@ pub(super) mod view;
 
 use rayon::prelude::*;
 
-use super::widened;
+use super::{Every, widened};
 use crate::config;
 use crate::error::Result;
 use crate::math::{Point, stats};
@@ -203,17 +203,9 @@ fn looked_at(recording: &Recording, tracks: &[Track], every_secs: f64) -> Vec<us
     let mut frames: Vec<usize> = tracks.iter().flat_map(|t| t.frames.iter().copied()).collect();
     frames.sort_unstable();
     frames.dedup();
-    let mut next = f64::NEG_INFINITY;
+    let mut every = Every::secs(every_secs);
     let last = frames.last().copied();
-    frames.retain(|&f| {
-        let time = recording.frames[f].timestamp_secs;
-        // A hair less, so that frames at just this rate are all taken.
-        let due = time >= next - 1e-6;
-        if due {
-            next = time + every_secs;
-        }
-        due || Some(f) == last
-    });
+    frames.retain(|&f| every.is_due(recording.frames[f].timestamp_secs) || Some(f) == last);
     frames
 }
 

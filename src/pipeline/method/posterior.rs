@@ -65,7 +65,7 @@ fn borne_out(group: &Group, reasoner: &dyn Reasoner) -> Option<(Judged, Vec<Hypo
     let by_far = config.part.by_far_nats;
     let trusted = by_trust(group.clips, group.members, config);
     let first = under_front(group, reasoner, &trusted)?;
-    let hands = Hands::of(group);
+    let hands = HandEvidence::of(group);
     if hands.best() - hands.nats(&first.1) <= by_far {
         return Some(first);
     }
@@ -83,12 +83,12 @@ fn borne_out(group: &Group, reasoner: &dyn Reasoner) -> Option<(Judged, Vec<Hypo
 }
 
 /// The hands of a part's clips as evidence of its joint.
-struct Hands<'a> {
+struct HandEvidence<'a> {
     paths: Vec<Vec<Point>>,
     config: &'a Config,
 }
 
-impl<'a> Hands<'a> {
+impl<'a> HandEvidence<'a> {
     fn of(group: &Group<'a>) -> Self {
         Self { paths: group.shown().iter().map(|(_, hand)| hand.positions()).collect(), config: group.config }
     }
@@ -115,24 +115,24 @@ impl<'a> Hands<'a> {
 
 /// The answer under the front of `trusted[0]`, the other clips behind it, and its hypotheses built.
 fn under_front(group: &Group, reasoner: &dyn Reasoner, trusted: &[usize]) -> Option<(Judged, Vec<Hypothesis>)> {
-    let mut look = judged(group, reasoner, trusted, &[])?;
+    let mut judgement = judged(group, reasoner, trusted, &[])?;
     let config = group.config;
     let rules = &config.inference.scene;
-    let around = Around::of(group, look.best);
+    let around = Around::of(group, judgement.best);
     // Without the depth of the open states there are no other outlines than before.
     if config.inference.second_look && config.inference.refit {
-        let worth = look.likely.iter().enumerate().filter(|(i, l)| *i == 0 || l.share >= rules.outlined_share);
+        let worth = judgement.likely.iter().enumerate().filter(|(i, l)| *i == 0 || l.share >= rules.outlined_share);
         // One round tells how far the part reaches; a second one is for the hinge.
-        let outlines: Vec<Rect> = worth.filter_map(|(_, l)| built(group, &look, l, &around, 1).part).collect();
+        let outlines: Vec<Rect> = worth.filter_map(|(_, l)| built(group, &judgement, l, &around, 1).part).collect();
         if !outlines.is_empty() {
-            look = judged(group, reasoner, trusted, &outlines)?;
+            judgement = judged(group, reasoner, trusted, &outlines)?;
         }
     }
     // What physics will not be asked about is not built.
-    let asked = if config.validation.feedback { look.likely.len() } else { 1 };
+    let asked = if config.validation.feedback { judgement.likely.len() } else { 1 };
     let hypotheses: Vec<Hypothesis> =
-        look.likely.iter().take(asked).map(|l| built(group, &look, l, &around, rules.rounds)).collect();
-    Some((look, hypotheses))
+        judgement.likely.iter().take(asked).map(|l| built(group, &judgement, l, &around, rules.rounds)).collect();
+    Some((judgement, hypotheses))
 }
 
 /// What all clips of one part say together. `trusted`: the clips with an answer; the first gives the face, the grip and the part's
@@ -215,7 +215,7 @@ fn chosen(pooled: &[AxisCandidate], answer: &Answer, rules: &SceneRules) -> Opti
         pooled.iter().zip(&weights).map(|(k, w)| (k.joint, (w - weights[top]).exp())).collect();
     let of_type = revolute_probability.max(1.0 - revolute_probability);
     Some(Said {
-        joint: aggregate::consensus(&pooled[top].joint, &all),
+        joint: aggregate::consensus(&pooled[top].joint, &all, rules),
         type_probability: Some(of_type),
         joint_probability: Some(of_type * inference::agreeing_share(&pooled[top].joint, &all)),
         likely: likely(pooled, answer, true, rules),
@@ -235,7 +235,7 @@ fn likely(candidates: &[AxisCandidate], answer: &Answer, merged: bool, rules: &S
             let members: Vec<(Articulation, f64)> =
                 e.members.iter().map(|&i| (candidates[i].joint, (weights[i] - weights[head]).exp())).collect();
             let seed = candidates[head].joint;
-            let joint = if merged { aggregate::consensus(&seed, &members) } else { seed };
+            let joint = if merged { aggregate::consensus(&seed, &members, rules) } else { seed };
             let chosen = candidates[head].clone();
             Some(Likely { joint, chosen, share: e.share, type_share: e.type_share })
         })
@@ -266,11 +266,7 @@ fn asked(
         let own_std_m = hands::grip_std_m(trajectory.closed_end_seen(), &config.hands.grips);
         // Depth and hands are biased clip by clip: the face and the grip of the clip itself fit its views best, those
         // of the best clip stand in where it did not see its closed end. Every candidate gets the same choice.
-        let own = clips[c].face.filter(|own| {
-            face.is_some_and(|f| {
-                crate::math::signed_angle(&own.normal, &f.normal) < config.inference.merge_angle_deg.to_radians()
-            })
-        });
+        let own = clips[c].face.filter(|own| face.is_some_and(|face| closed::face_alike(own, &face, config)));
         let mut closed = Vec::new();
         for &rect in &rects {
             closed.extend(face.map(|face| weigh::ClosedFront { face, rect, grip, grip_std_m: best_std_m }));

@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 
 use super::Subject;
-use super::looks::Look;
+use super::looks::FrameLook;
 use crate::math::{Pose, Vector};
 
 /// Pairs of looks that are compared at the most: more hardly tell more, and all readings are asked about each.
@@ -43,11 +43,11 @@ impl Candidate<'_> {
     }
 
     /// Of each pair, the share of places that meet.
-    pub fn shares(&self, looks: &[Look], pairs: &[Pair]) -> Vec<f64> {
+    pub fn shares(&self, looks: &[FrameLook], pairs: &[Pair]) -> Vec<f64> {
         pairs.iter().map(|p| self.share(looks.get(p.a), looks.get(p.b)).unwrap_or(0.0)).collect()
     }
 
-    fn share(&self, a: Option<&Look>, b: Option<&Look>) -> Option<f64> {
+    fn share(&self, a: Option<&FrameLook>, b: Option<&FrameLook>) -> Option<f64> {
         let (a, b) = (a?, b?);
         let (from, to) = (self.pose(a.frame)?, self.pose(b.frame)?);
         let back = to.rotation.inverse();
@@ -59,7 +59,7 @@ impl Candidate<'_> {
 }
 
 /// Pairs of looks that may overlap, evenly thinned. Read as declared: angles between poses are the same in most readings.
-pub(super) fn pairs(subject: &Subject, looks: &[Look]) -> Vec<Pair> {
+pub(super) fn pairs(subject: &Subject, looks: &[FrameLook]) -> Vec<Pair> {
     let mut all = Vec::new();
     for (a, from) in looks.iter().enumerate() {
         for (b, to) in looks.iter().enumerate().skip(a + 1) {

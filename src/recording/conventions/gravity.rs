@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix3;
 
-use super::looks::Look;
+use super::looks::FrameLook;
 use super::{Finding, Fix, LIKELY_NATS};
 use crate::math::{Pose, Vector, eigen_descending, stats, unit};
 
@@ -40,7 +40,7 @@ struct Evidence {
 }
 
 /// Compares the six axes of the world, and the one that cameras tell, with +Z.
-pub(super) fn judge(poses: &[Pose], looks: &[Look]) -> Option<Finding> {
+pub(super) fn judge(poses: &[Pose], looks: &[FrameLook]) -> Option<Finding> {
     if poses.len() < LEAST {
         return None;
     }

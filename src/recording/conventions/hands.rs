@@ -5,7 +5,7 @@ use nalgebra::Matrix3;
 use rayon::prelude::*;
 
 use super::agreement::student;
-use super::looks::Look;
+use super::looks::FrameLook;
 use super::reading::axes;
 use super::{Finding, Fix, LIKELY_NATS, Subject, hiding, sides};
 use crate::math::{Point, Pose, Vector, stats};
@@ -38,7 +38,7 @@ pub(super) const REACH_M: std::ops::Range<f64> = 0.05..2.5;
 /// What one frame sees.
 enum Sight<'a> {
     Mask(Grid<u8>),
-    Depth(&'a Look),
+    Depth(&'a FrameLook),
 }
 
 /// A frame and what it sees.
@@ -65,7 +65,7 @@ pub(super) fn period(secs: &[f64]) -> f64 {
 }
 
 /// What is seen at the hands over their own distance, the median; `None` where they are not in the images.
-pub(super) fn depth_ratio(subject: &Subject, looks: &[Look]) -> Option<f64> {
+pub(super) fn depth_ratio(subject: &Subject, looks: &[FrameLook]) -> Option<f64> {
     let (mut all, mut ratios) = (0usize, Vec::new());
     for look in looks {
         let Some(pose) = subject.poses.get(look.frame) else { continue };
@@ -79,13 +79,13 @@ pub(super) fn depth_ratio(subject: &Subject, looks: &[Look]) -> Option<f64> {
 }
 
 /// Findings about hands under poses that are right.
-pub(super) fn judge(subject: &Subject, looks: &[Look]) -> Option<Finding> {
+pub(super) fn judge(subject: &Subject, looks: &[FrameLook]) -> Option<Finding> {
     // A mirror image changes sides, too.
     placed(subject, looks).or_else(|| sides::judge(subject))
 }
 
 /// What is wrong about where hands are.
-fn placed(subject: &Subject, looks: &[Look]) -> Option<Finding> {
+fn placed(subject: &Subject, looks: &[FrameLook]) -> Option<Finding> {
     let witnesses = witnesses(subject, looks);
     // Hands of another time are not where they are seen either: where a lag explains it, nothing else is asked.
     if matches!(witnesses.first().map(|w| &w.sight), Some(Sight::Mask(_))) {
@@ -117,7 +117,7 @@ pub(super) fn is_near(subject: &Subject, frame: usize) -> bool {
 }
 
 /// Frames around hands with masks that show hands, else the looks.
-fn witnesses<'a>(subject: &Subject, looks: &'a [Look]) -> Vec<Witness<'a>> {
+fn witnesses<'a>(subject: &Subject, looks: &'a [FrameLook]) -> Vec<Witness<'a>> {
     let wanted: Vec<usize> = subject.with_mask.iter().copied().filter(|&f| is_near(subject, f)).collect();
     let masks: Vec<Witness> = stretches(&wanted, MASKS)
         .into_par_iter()

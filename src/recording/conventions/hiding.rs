@@ -10,7 +10,7 @@ use super::hands::{
     HARMLESS_SECS, LAG_NATS, LEAST, LEAST_LAG, MOST_LAG, NEARLY, REACH_M, RIGHT, is_near, mirror_words, mirrored,
     period, projected, stretches, told_lag,
 };
-use super::looks::{self, Look};
+use super::looks::{self, FrameLook};
 use super::{Finding, LIKELY_NATS, Subject};
 use crate::math::{Point, stats};
 
@@ -32,7 +32,7 @@ type Seen = Vec<Option<f64>>;
 pub(super) struct Hiding<'a> {
     subject: &'a Subject<'a>,
     /// By frame, rising.
-    looks: Vec<Look>,
+    looks: Vec<FrameLook>,
 }
 
 /// How often hands are seen at a lag, and in the whole neighbourhood of it.

@@ -7,7 +7,7 @@ use nalgebra::Matrix3;
 use rayon::prelude::*;
 
 use super::agreement::{Candidate, Pair, mean, nats};
-use super::looks::Look;
+use super::looks::FrameLook;
 use super::{Finding, LIKELY_NATS, Subject};
 use crate::recording::Camera;
 
@@ -109,9 +109,9 @@ struct Rated {
 }
 
 /// The share of places that meet through a lens, of each pair.
-fn shares(lens: Lens, scale: f64, subject: &Subject, looks: &[Look], pairs: &[Pair]) -> Vec<f64> {
+fn shares(lens: Lens, scale: f64, subject: &Subject, looks: &[FrameLook], pairs: &[Pair]) -> Vec<f64> {
     let camera = lens.of(&subject.camera);
-    let seen: Vec<Look> = looks.iter().map(|look| look.through(&camera)).collect();
+    let seen: Vec<FrameLook> = looks.iter().map(|look| look.through(&camera)).collect();
     Candidate { poses: &subject.poses, axes: Matrix3::identity(), scale, lag: 0 }.shares(&seen, pairs)
 }
 
@@ -119,7 +119,7 @@ fn shares(lens: Lens, scale: f64, subject: &Subject, looks: &[Look], pairs: &[Pa
 /// of each pair as `declared`).
 pub(super) fn judge(
     subject: &Subject,
-    looks: &[Look],
+    looks: &[FrameLook],
     pairs: &[Pair],
     declared: &[f64],
     rival: &[f64],

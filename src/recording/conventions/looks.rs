@@ -19,7 +19,7 @@ const LEAST_FRAMES: usize = 20;
 const PLACES: f64 = 80.0;
 
 /// A look.
-pub(super) struct Look {
+pub(super) struct FrameLook {
     /// Its frame.
     pub frame: usize,
     /// Places that it sees, its camera's frame.
@@ -31,14 +31,14 @@ pub(super) struct Look {
 }
 
 /// Evenly spread looks, in the order of frames.
-pub(super) fn looks(subject: &Subject) -> Vec<Look> {
+pub(super) fn looks(subject: &Subject) -> Vec<FrameLook> {
     let area = (subject.camera.width * subject.camera.height).max(1);
     let most = (PIXELS / area).clamp(LEAST_FRAMES, FRAMES);
     at(subject, &spread(&subject.with_depth, most))
 }
 
 /// Looks at these frames, in their order; frames whose depth cannot be read are left out.
-pub(super) fn at(subject: &Subject, frames: &[usize]) -> Vec<Look> {
+pub(super) fn at(subject: &Subject, frames: &[usize]) -> Vec<FrameLook> {
     frames.par_iter().filter_map(|&frame| Some(look(frame, &(subject.depth)(frame)?, &subject.camera))).collect()
 }
 
@@ -50,7 +50,7 @@ fn spread(all: &[usize], most: usize) -> Vec<usize> {
     (0..most).filter_map(|i| all.get(i * (all.len() - 1) / (most - 1)).copied()).collect()
 }
 
-fn look(frame: usize, depth: &Grid<f32>, full: &Camera) -> Look {
+fn look(frame: usize, depth: &Grid<f32>, full: &Camera) -> FrameLook {
     let sketch = Sketch::of(frame, depth, None);
     let (width, height) = (sketch.depth_mm.width, sketch.depth_mm.height);
     let stride = (((width * height) as f64 / PLACES).sqrt() as usize).max(1);
@@ -61,10 +61,10 @@ fn look(frame: usize, depth: &Grid<f32>, full: &Camera) -> Look {
     // Wide enough to average pixel noise, narrow enough for a drawer's front.
     let reach = (width / 40).max(2);
     let normals = grid((stride / 2).max(1)).filter_map(|(x, y)| sketch.normal(full, x, y, reach)).collect();
-    Look { frame, places, normals, camera: sketch.camera(full), sketch: Arc::new(sketch) }
+    FrameLook { frame, places, normals, camera: sketch.camera(full), sketch: Arc::new(sketch) }
 }
 
-impl Look {
+impl FrameLook {
     /// The same places where they are through another camera of the full image's size, without their normals.
     pub fn through(&self, full: &Camera) -> Self {
         let camera = self.sketch.camera(full);

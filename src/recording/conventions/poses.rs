@@ -4,7 +4,7 @@ use nalgebra::Matrix3;
 use rayon::prelude::*;
 
 use super::agreement::{Candidate, Pair, mean, nats, pairs};
-use super::looks::Look;
+use super::looks::FrameLook;
 use super::reading::{axes, axes_words, is_opengl, with_axes};
 use super::{Finding, Fix, LIKELY_NATS, Reading, Subject, lens};
 use crate::math::{Pose, stats};
@@ -56,7 +56,7 @@ struct Rated<'a> {
 
 /// All that is compared.
 struct Board<'a> {
-    looks: &'a [Look],
+    looks: &'a [FrameLook],
     pairs: Vec<Pair>,
 }
 
@@ -72,7 +72,7 @@ impl Board<'_> {
 }
 
 /// Compares all readings.
-pub(super) fn judge(subject: &Subject, looks: &[Look]) -> Judged {
+pub(super) fn judge(subject: &Subject, looks: &[FrameLook]) -> Judged {
     let as_is = Judged { findings: Vec::new(), poses: subject.poses.clone(), is_turned: false, is_lens: false };
     let board = Board { looks, pairs: pairs(subject, looks) };
     if looks.len() < LEAST || board.pairs.len() < LEAST {
@@ -271,7 +271,7 @@ fn told_scale(board: &Board, subject: &Subject, best: &Rated) -> Option<Finding>
         return None;
     }
     let plain = board.rate(best.reading, Candidate { scale: 1.0, ..best.candidate });
-    let depth: Vec<f64> = board.looks.iter().filter_map(Look::median_depth).collect();
+    let depth: Vec<f64> = board.looks.iter().filter_map(FrameLook::median_depth).collect();
     let depth = stats::median(&depth).unwrap_or(0.0);
     // Hands are in the poses' world: where they lie near the surfaces that are seen beside them the unit of both is right.
     let ratio = super::hands::depth_ratio(subject, board.looks);
