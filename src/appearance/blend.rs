@@ -113,7 +113,7 @@ fn balanced(texels: &[&Texel], channel: usize, logs: &[f64], gains: &[f64], gate
     let n = gains.len();
     let mut matrix = DMatrix::<f64>::zeros(n, n);
     let mut rhs = DVector::<f64>::zeros(n);
-    let usable = |s: &TexelSample| s.score > 0 && (DARK..=BRIGHT).contains(&s.rgb[channel]);
+    let usable = |s: &TexelSample| s.score > 0 && !s.makeshift && (DARK..=BRIGHT).contains(&s.rgb[channel]);
     for texel in texels {
         for (i, a) in texel.samples.iter().enumerate() {
             for b in texel.samples.iter().skip(i + 1).filter(|b| usable(b) && usable(a)) {
@@ -139,15 +139,21 @@ fn balanced(texels: &[&Texel], channel: usize, logs: &[f64], gains: &[f64], gate
     solved.iter().all(|g| g.is_finite()).then(|| solved.iter().copied().collect())
 }
 
+/// Whether a frame shows the texel itself.
+fn is_seen(samples: &[TexelSample]) -> bool {
+    samples.iter().any(|s| s.score > 0 && !s.makeshift)
+}
+
 /// The colour of a texel: the samples that agree with the one that most of the weight agrees with.
 fn blend(samples: &[TexelSample], gains: &[Gain]) -> Option<[f32; 3]> {
     let colour = |s: &TexelSample| -> [f32; 3] {
         let gain = gains.get(usize::from(s.sight)).copied().unwrap_or([1.0; 3]);
         std::array::from_fn(|k| f32::from(s.rgb[k]) * gain[k])
     };
+    let is_seen = is_seen(samples);
     let told: Vec<([f32; 3], f32)> = samples
         .iter()
-        .filter(|s| s.score > 0)
+        .filter(|s| s.score > 0 && (!s.makeshift || !is_seen))
         // The score is the root of what a sample is worth.
         .map(|s| (colour(s), (f32::from(s.score) / 65_535.0).powi(2)))
         .collect();
@@ -169,17 +175,19 @@ struct ChartPicture {
     width: usize,
     texels: Vec<[f32; 4]>,
     seen: usize,
+    coloured: usize,
     covered: usize,
 }
 
 impl ChartPicture {
     fn of(chart: &Chart, tiles: &[TexelTile], gains: &[Gain]) -> Self {
         let [width, height] = chart.size.map(|s| s as usize);
-        let mut picture = Self { width, texels: vec![[0.0; 4]; width * height], seen: 0, covered: 0 };
+        let mut picture = Self { width, texels: vec![[0.0; 4]; width * height], seen: 0, coloured: 0, covered: 0 };
         for texel in tiles.iter().flat_map(|t| &t.texels) {
             picture.covered += 1;
             let Some([r, g, b]) = blend(&texel.samples, gains) else { continue };
-            picture.seen += 1;
+            picture.seen += usize::from(is_seen(&texel.samples));
+            picture.coloured += 1;
             if let Some(at) = picture.texels.get_mut(usize::from(texel.at[1]) * width + usize::from(texel.at[0])) {
                 *at = [r, g, b, 1.0];
             }
@@ -191,7 +199,7 @@ impl ChartPicture {
 
     /// 8-bit colours with every gap filled: from a coarser and coarser picture of what is known, or with one colour.
     fn filled(mut self, plain: [f32; 3]) -> Vec<u8> {
-        if self.seen == 0 {
+        if self.coloured == 0 {
             self.texels.iter_mut().for_each(|t| *t = [plain[0], plain[1], plain[2], 1.0]);
         } else {
             fill(&mut self.texels, self.width);
@@ -293,7 +301,7 @@ mod tests {
     use super::*;
 
     fn sample(sight: u16, level: u8, score: u16) -> TexelSample {
-        TexelSample { score, sight, rgb: [level; 3] }
+        TexelSample { score, sight, rgb: [level; 3], makeshift: false }
     }
 
     #[test]
@@ -303,6 +311,18 @@ mod tests {
         let [r, _, b] = blend(&samples, &gains).unwrap();
         assert!((101.9..102.1).contains(&r) && r == b, "{r}");
         assert_eq!(blend(&[TexelSample::default(); 4], &gains), None);
+    }
+
+    #[test]
+    fn what_may_hide_a_texel_colours_it_where_nothing_else_does() {
+        let gains = vec![[1.0; 3]; 4];
+        let hidden = |level: u8| TexelSample { makeshift: true, ..sample(1, level, 60_000) };
+        let both = [hidden(200), sample(0, 100, 10), TexelSample::default(), TexelSample::default()];
+        assert_eq!(blend(&both, &gains), Some([100.0; 3]));
+        assert!(is_seen(&both) && both[1].rank() > both[0].rank() && both[0].rank() > both[2].rank());
+        let alone = [hidden(200), hidden(200), TexelSample::default(), TexelSample::default()];
+        assert_eq!(blend(&alone, &gains), Some([200.0; 3]));
+        assert!(!is_seen(&alone));
     }
 
     #[test]

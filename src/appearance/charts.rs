@@ -21,6 +21,8 @@ pub(super) struct Chart {
     pub(super) owner: Option<usize>,
     /// Index of the part whose colour stands for its own: it was assumed, and no frame is asked.
     pub(super) assumed: Option<usize>,
+    /// Whether what stands around the closed part hides it, or may be taken for it.
+    pub(super) shut_in: bool,
     /// Local, with every part closed.
     pub(super) positions: Vec<Local>,
     /// Unit.
@@ -47,6 +49,7 @@ impl Chart {
         Self {
             owner: None,
             assumed: None,
+            shut_in: false,
             positions,
             normals,
             triangles,

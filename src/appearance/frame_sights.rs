@@ -89,6 +89,16 @@ impl FrameSight {
         Some(1.0 - 0.75 * off / tolerance)
     }
 
+    /// Whether something is seen at a pixel of the samples' camera that stands before a depth, by no more than `most` metres.
+    pub(super) fn shows_before(&self, [u, v]: [f32; 2], z: f32, most: f32) -> bool {
+        let [x, y] = [u + 0.5, v + 0.5];
+        if !(x >= 0.0 && y >= 0.0 && x < self.lens.width as f32 && y < self.lens.height as f32) {
+            return false;
+        }
+        let depth = self.depth(y as usize * self.lens.width + x as usize);
+        depth > 0.0 && (z - most..z).contains(&depth)
+    }
+
     /// Whether what is seen at the middle of a ball (camera frame) stands far before all of it.
     pub(super) fn hides(&self, middle: &Local, radius: f32) -> bool {
         /// What stands nearer may hide the middle alone.

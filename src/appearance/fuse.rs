@@ -50,10 +50,20 @@ impl Volume {
 
     /// The weight of the voxel that is nearest to a place; 0 where there is none.
     pub(super) fn weight(&self, p: &Local) -> f32 {
+        self.nearest(p).map_or(0.0, |voxel| voxel[1])
+    }
+
+    /// Whether views looked through a place: it is known to be more than a voxel before any surface.
+    pub(super) fn is_free(&self, p: &Local) -> bool {
+        self.nearest(p).is_some_and(|[distance, weight]| weight > 0.0 && distance > self.voxel)
+    }
+
+    /// Distance and weight of the voxel that is nearest to a place.
+    fn nearest(&self, p: &Local) -> Option<[f32; 2]> {
         let at = [p.x, p.y, p.z].map(|c| (c / self.voxel - 0.5).round() as i32);
         let [x, y, z] = at.map(|c| c.rem_euclid(SIDE as i32) as usize);
         let block = self.find(&at.map(|c| c.div_euclid(SIDE as i32))).and_then(|b| self.blocks.get(b));
-        block.and_then(|b| b.voxels.get((z * SIDE + y) * SIDE + x)).map_or(0.0, |voxel| voxel[1])
+        block.and_then(|b| b.voxels.get((z * SIDE + y) * SIDE + x)).copied()
     }
 
     /// Where a voxel of the whole grid is, counted from the origin.

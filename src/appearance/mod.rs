@@ -5,7 +5,7 @@
 //! that lie on a part, wherever it is in a frame, are the part's and not the room's, so that an open door has its inside behind it
 //! and not its own front. Everything is computed relative to the first camera, in `f32`.
 //!
-//! The surface loses what noise made of it (`clean`), then vertices (`coarse`, `simplify`), and is laid flat in few charts
+//! The surface loses what noise made of it (`clean`) and small holes (`holes`), then vertices (`coarse`, `simplify`), and is laid flat in few charts
 //! (`regions`) whose texels are as fine as the frames that show them (`density`).
 
 mod blend;
@@ -17,6 +17,7 @@ mod density;
 mod frame_choice;
 mod frame_sights;
 mod fuse;
+mod holes;
 mod local;
 mod pages;
 mod part_charts;
@@ -78,6 +79,7 @@ pub fn look(
     // Shards first: they have rims all around.
     let surface = surface_mesh::without_shards(surface_mesh::surface(&volume), config.shard_m2);
     let surface = clean::without_frays(surface, &volume, config);
+    let surface = holes::closed(surface, &volume, twin, &origin, config);
     let voxel = volume.voxel;
     drop(volume);
     let surface = coarse::reduced(surface, voxel, config);

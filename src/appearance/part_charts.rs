@@ -6,7 +6,7 @@ use super::frame_choice::State;
 use super::frame_sights::FrameSight;
 use super::local::Local;
 use crate::math::{Point, Vector};
-use crate::twin::{Furniture, OrientedBox, Twin};
+use crate::twin::{Furniture, OrientedBox, Role, Twin};
 
 /// Samples of one frame that show the inside of a piece of furniture.
 const ENOUGH: usize = 150;
@@ -15,6 +15,9 @@ const OUTLINE_M: f64 = 0.04;
 /// Nearer to the front than this it may be the front, metres.
 const FRONT_M: f64 = 0.08;
 
+/// Faces that look out of the front (cosine).
+const FRONTAL: f64 = 0.7;
+
 /// All faces of the parts' boxes, and the inner faces of boards that only assumption has.
 pub(super) fn charts(twin: &Twin, origin: &Point, sights: &[FrameSight]) -> Vec<Chart> {
     let mut out = Vec::new();
@@ -22,7 +25,10 @@ pub(super) fn charts(twin: &Twin, origin: &Point, sights: &[FrameSight]) -> Vec<
         for solid in &piece.part.solids {
             for (axis, sense) in [0, 1, 2].into_iter().flat_map(|axis| [(axis, 1.0), (axis, -1.0)]) {
                 let chart = face(&solid.shape, axis, sense, origin);
-                out.push(Chart { owner: Some(number), ..chart });
+                // Of a closed part the front and what is on it are seen. A part's axes are right, up and out of its face.
+                let out_of_front = piece.part.bounds.rotation.column(2).dot(&solid.shape.rotation.column(axis)) * sense;
+                let shut_in = solid.role != Role::Handle && out_of_front < FRONTAL;
+                out.push(Chart { owner: Some(number), shut_in, ..chart });
             }
         }
         if !looked_into(piece, number, origin, sights) {

@@ -11,6 +11,8 @@ pub(super) const LEAST_COSINE: f32 = 0.15;
 /// are boxes, and further from what was seen than the room's own mesh.
 const ROOM_OFF: [f32; 2] = [0.02, 0.02];
 const PART_OFF: [f32; 2] = [0.045, 0.02];
+/// What stands before a surface of the room by no more than this may be painted onto it: handles stand off so far, metres.
+pub(super) const BEFORE_M: f32 = 0.07;
 
 /// What a frame says of a texel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -20,6 +22,16 @@ pub(super) struct TexelSample {
     /// Position of the frame among the sights.
     pub(super) sight: u16,
     pub(super) rgb: [u8; 3],
+    /// Of what may hide the texel: what stands a little before it, or around a closed front. Counts where no frame shows the texel
+    /// itself.
+    pub(super) makeshift: bool,
+}
+
+impl TexelSample {
+    /// Samples of the texel itself come after all others, by their scores.
+    pub(super) fn rank(&self) -> (bool, u16) {
+        (self.score > 0 && !self.makeshift, self.score)
+    }
 }
 
 /// A texel that a triangle covers.

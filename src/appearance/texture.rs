@@ -7,7 +7,7 @@ use super::charts::{self, Chart};
 use super::frame_choice::State;
 use super::frame_sights::{FrameSight, Setting};
 use super::local::{Local, RigidMotion};
-use super::texels::{BEST, LEAST_COSINE, Texel, TexelSample, TexelTile, name, pose_of, tolerance};
+use super::texels::{BEFORE_M, BEST, LEAST_COSINE, Texel, TexelSample, TexelTile, name, pose_of, tolerance};
 use super::{blend, density};
 use crate::error::Result;
 use crate::look::Texture;
@@ -217,6 +217,8 @@ fn look_at(tile: &mut TexelTile, chart: &Chart, view: &PaintedView) {
     if !sight.lens.meets(&middle, tile.radius) || no_use(tile, &pose, &middle, view) {
         return;
     }
+    let is_closed = |part: usize| matches!(sight.states.get(part), Some(State::Closed));
+    let shut_in = chart.shut_in && chart.owner.is_some_and(is_closed);
     let axes: [Local; 3] = chart.axes.map(|axis| pose.rotation * axis);
     let base = pose.translation + axes[0] * chart.low[0] + axes[1] * chart.low[1];
     let (right, down) = (axes[0] * chart.texel, axes[1] * chart.texel);
@@ -235,14 +237,18 @@ fn look_at(tile: &mut TexelTile, chart: &Chart, view: &PaintedView) {
         }
         let at = sight.lens.project(&p);
         let tolerance = tolerance(chart.owner, p.z);
-        let Some(agreement) = sight.agrees(at, p.z, tolerance, chart.owner.is_none()) else { continue };
+        let (agreement, makeshift) = match sight.agrees(at, p.z, tolerance, chart.owner.is_none()) {
+            Some(agreement) => (agreement, shut_in),
+            None if chart.owner.is_none() && sight.shows_before(at, p.z, BEFORE_M) => (1.0, true),
+            None => continue,
+        };
         // Lenses are worse at the rim, and what is corrected there is stretched.
         let rim = (at[0].min(width - at[0]) / width).min(at[1].min(height - at[1]) / height);
         let near = p.z.max(SHARP_M);
         let score = view.sharpness * cosine * cosine * agreement * (20.0 * rim).clamp(0.1, 1.0) / (near * near);
-        keep(texel, score, view, at);
+        keep(texel, (score, makeshift), view, at);
     }
-    let kept = tile.texels.iter().flat_map(|t| &t.samples).map(|s| s.score);
+    let kept = tile.texels.iter().flat_map(|t| &t.samples).map(|s| if s.makeshift { 0 } else { s.score });
     tile.least = kept.min().unwrap_or(0);
 }
 
@@ -270,15 +276,15 @@ fn ranked(score: f32) -> u16 {
 }
 
 /// Keeps a sample if it is among the best.
-fn keep(texel: &mut Texel, score: f32, view: &PaintedView, at: [f32; 2]) {
-    let score = ranked(score);
-    let Some(worst) = texel.samples.iter_mut().min_by_key(|s| s.score) else { return };
-    if worst.score >= score {
+fn keep(texel: &mut Texel, (score, makeshift): (f32, bool), view: &PaintedView, at: [f32; 2]) {
+    let new = TexelSample { score: ranked(score), sight: view.number, rgb: [0; 3], makeshift };
+    let Some(worst) = texel.samples.iter_mut().min_by_key(|s| s.rank()) else { return };
+    if worst.rank() >= new.rank() {
         return;
     }
     let step = view.sight.step as f32;
     let first = (view.sight.step / 2) as f32;
-    *worst = TexelSample { score, sight: view.number, rgb: bilinear(view.image, at.map(|c| c * step + first)) };
+    *worst = TexelSample { rgb: bilinear(view.image, at.map(|c| c * step + first)), ..new };
 }
 
 /// Colour between pixels.

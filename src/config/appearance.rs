@@ -35,6 +35,8 @@ block! {
         rim_weight: f64 = 0.1, "1/m^2", "ours";
         /// So much is taken off a frayed rim at the most: truncation and a little more.
         rim_m: f64 = 0.05, "m", "ours";
+        /// Holes in flat surface that no view looked through are closed up to this length: what handles hide.
+        hole_m: f64 = 0.25, "m", "ours";
         /// Triangles of the room.
         triangles: usize = 80_000, "triangles", "ours";
         /// Edge of a texel: a pixel of a VGA camera at a metre and a half. It grows where `texels` would not suffice.
