@@ -3,11 +3,14 @@
 use super::frame_choice::State;
 use super::local::Local;
 use super::sight_camera::SightCamera;
-use crate::math::Vector;
+use crate::math::{Point, Vector};
 use crate::twin::{OrientedBox, Part, Role};
 
-/// A front's edge is known to this, metres: a seam's width more would take the neighbour's edge.
-const EDGE_M: f64 = 0.005;
+/// The surface around a closed front goes on to so far within its outline, metres, and is cut there afterwards: where a surface ends
+/// fusion loses a voxel of it.
+const WITHIN_M: f64 = 0.015;
+/// Between a front and what is around it, metres.
+const SEAM_M: f64 = 0.003;
 /// Handles are bars in the twin and any shape in the kitchen, metres.
 const HANDLE_M: f64 = 0.02;
 /// Places at which a part on its way is looked for.
@@ -21,7 +24,7 @@ pub(super) fn of_part(part: &Part, state: State, slab_m: f64) -> Vec<OrientedBox
             .solids
             .iter()
             .filter(|s| s.role != Role::Tray)
-            .map(|s| if s.role == Role::Front { slab(&s.shape, EDGE_M, slab_m) } else { grown(&s.shape, HANDLE_M) })
+            .map(|s| if s.role == Role::Front { slab(&s.shape, -WITHIN_M, slab_m) } else { grown(&s.shape, HANDLE_M) })
             .collect(),
         State::Open(opening) => standing(part, opening, slab_m),
         State::Moving => {
@@ -49,7 +52,23 @@ fn standing(part: &Part, opening: f64, slab_m: f64) -> Vec<OrientedBox> {
 fn slab(shape: &OrientedBox, edge_m: f64, slab_m: f64) -> OrientedBox {
     let thin = shape.half.imin();
     let more = Vector::from_fn(|i, _| if i == thin { slab_m } else { edge_m });
-    OrientedBox { half: shape.half + more, ..*shape }
+    OrientedBox { half: (shape.half + more).map(|h| h.max(0.0)), ..*shape }
+}
+
+/// The fronts of a closed part with the seam around them, as far out as what is seen of them is off. Boards end behind them.
+pub(super) fn fronts(part: &Part, slab_m: f64) -> impl Iterator<Item = OrientedBox> {
+    // A part's axes are right, up and out of its face.
+    let before = part.bounds.rotation.column(2) * (0.5 * slab_m);
+    part.solids.iter().filter(|s| s.role == Role::Front).map(move |s| {
+        let shape = slab(&s.shape, SEAM_M, 0.5 * slab_m);
+        OrientedBox { center: shape.center + before, ..shape }
+    })
+}
+
+/// Whether a point (world) is in a box.
+pub(super) fn holds(shape: &OrientedBox, p: &Point) -> bool {
+    let local = shape.rotation.transpose() * (p - shape.center);
+    local.iter().zip(shape.half.iter()).all(|(l, h)| l.abs() <= *h)
 }
 
 fn grown(shape: &OrientedBox, by: f64) -> OrientedBox {

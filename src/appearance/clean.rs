@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::boxes::{self, holds};
 use super::fuse::Volume;
 use super::local::Local;
 use super::surface_mesh::{SurfaceMesh, root};
@@ -11,6 +12,8 @@ use crate::twin::{OrientedBox, Solid, Twin};
 
 /// Pieces on furniture stay from this share of a shard's length on: what stands there is small.
 const ON_FURNITURE: f64 = 0.2;
+/// What turns less from a front (cosine) is of the front, or looks like it.
+const FLAT: f32 = 0.7;
 /// What the names of the room's boxes begin with that carry nothing: people stand on the floor, and walls are upright.
 const BARE: [&str; 2] = ["room_floor", "room_wall"];
 
@@ -44,6 +47,58 @@ pub(super) fn without_frays(mut mesh: SurfaceMesh, volume: &Volume, config: &con
         }
     }
     mesh.compacted()
+}
+
+/// Cuts the surface along the seams around the fronts of closed parts: what lies within as a front does is theirs. Boards that end
+/// behind a front stay. `origin` is the local one, world.
+pub(super) fn without_fronts(
+    mut mesh: SurfaceMesh,
+    twin: &Twin,
+    origin: &Point,
+    config: &config::Appearance,
+) -> SurfaceMesh {
+    for front in twin.furniture.iter().flat_map(|f| boxes::fronts(&f.part, config.slab_m)) {
+        cut(&mut mesh, &front, origin);
+    }
+    mesh.compacted()
+}
+
+/// Takes what lies flat within a front out of a surface, and moves what is left of triangles at its sides onto them.
+fn cut(mesh: &mut SurfaceMesh, front: &OrientedBox, origin: &Point) {
+    let world = |p: &Local| origin + p.map(f64::from);
+    let out: Local = front.rotation.column(front.half.imin()).map(|c| c as f32);
+    let mut within: Vec<bool> = mesh.positions.par_iter().map(|p| holds(front, &world(p))).collect();
+    let mut left = Vec::with_capacity(mesh.triangles.len());
+    let mut boards = Vec::new();
+    for triangle in &mesh.triangles {
+        let across = mesh.across(triangle);
+        if !triangle.iter().all(|v| within[*v as usize]) {
+            left.push(*triangle);
+        } else if across.dot(&out).abs() <= FLAT * across.norm() {
+            boards.push(*triangle);
+        }
+    }
+    for v in boards.iter().flatten() {
+        within[*v as usize] = false;
+    }
+    for (p, _) in mesh.positions.iter_mut().zip(&within).filter(|(_, within)| **within) {
+        *p = (at_seam(front, &world(p)) - origin).map(|c| c as f32);
+    }
+    left.extend(boards);
+    mesh.triangles = left;
+}
+
+/// The place on the nearest of a front's narrow sides, for a point within.
+fn at_seam(front: &OrientedBox, p: &Point) -> Point {
+    let local = front.rotation.transpose() * (p - front.center);
+    let thin = front.half.imin();
+    let room = |axis: &usize| front.half[*axis] - local[*axis].abs();
+    let nearest = (0..3).filter(|axis| *axis != thin).min_by(|a, b| room(a).total_cmp(&room(b)));
+    let mut moved = local;
+    if let Some(axis) = nearest {
+        moved[axis] = front.half[axis].copysign(local[axis]);
+    }
+    front.center + front.rotation * moved
 }
 
 /// A piece of surface that hangs together: its square metres, and the corners of its box.
@@ -113,12 +168,6 @@ fn furniture(twin: &Twin, around_m: f64) -> Vec<OrientedBox> {
     pieces.chain(of_room).map(wider).collect()
 }
 
-/// Whether a point (world) is in a box.
-fn holds(shape: &OrientedBox, p: &Point) -> bool {
-    let local = shape.rotation.transpose() * (p - shape.center);
-    local.iter().zip(shape.half.iter()).all(|(l, h)| l.abs() <= *h)
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::fuse::{COUNT, SIDE, VoxelBlock};
@@ -138,14 +187,7 @@ mod tests {
     }
 
     fn bare() -> Twin {
-        Twin {
-            name: "r".to_owned(),
-            density_kg_per_m3: 700.0,
-            drives: crate::config::Drives::default(),
-            furniture: Vec::new(),
-            room: Vec::new(),
-            left_out: Vec::new(),
-        }
+        Twin::of(Vec::new())
     }
 
     #[test]
@@ -175,6 +217,31 @@ mod tests {
         assert!((widest(&all) - 0.5).abs() < 0.031, "{}", widest(&all));
         // Where it was seen well it stays.
         assert!(few.positions.iter().any(|p| p.x < 0.101 && p.y < 0.101));
+    }
+
+    #[test]
+    fn a_front_is_cut_out_along_its_outline_and_boards_behind_it_stay() {
+        let mut mesh = SurfaceMesh::default();
+        sheet(&mut mesh, [0.0, 0.0], 0.0, 20);
+        let square = mesh.triangles.len();
+        // A board that ends behind the front: a strip across it.
+        let first = mesh.positions.len() as u32;
+        let board = [[0.2, 0.15, -0.01], [0.2, 0.17, -0.01], [0.2, 0.15, 0.005]].map(Local::from);
+        mesh.positions.extend(board);
+        mesh.triangles.push([first, first + 1, first + 2]);
+        let half = Vector::new(0.105, 0.083, 0.02);
+        let turn = nalgebra::Matrix3::identity();
+        let front = OrientedBox { center: Point::new(0.2, 0.2, 1.0), half, rotation: turn };
+        cut(&mut mesh, &front, &Point::new(0.0, 0.0, 1.0));
+        assert!(mesh.triangles.len() < square);
+        assert_eq!(mesh.triangles.last().map(|t| t.map(|v| mesh.positions[v as usize])), Some(board));
+        let flat: f32 = mesh.triangles.iter().rev().skip(1).map(|t| 0.5 * mesh.across(t).norm()).sum();
+        // Corners are cut off by half a triangle.
+        let missing = 0.16 - flat;
+        assert!((missing - 4.0 * 0.105 * 0.083).abs() < 4.0 * 0.0002, "{missing}");
+        let inside = |p: &Local| (p.x - 0.2).abs() < 0.104 && (p.y - 0.2).abs() < 0.082;
+        let flat = mesh.triangles.iter().rev().skip(1).flatten();
+        assert!(flat.clone().count() > 0 && !flat.clone().any(|v| inside(&mesh.positions[*v as usize])));
     }
 
     #[test]

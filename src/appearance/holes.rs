@@ -3,8 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use super::boxes;
-use super::frame_choice::State;
+use super::boxes::{self, holds};
 use super::fuse::Volume;
 use super::local::Local;
 use super::surface_mesh::SurfaceMesh;
@@ -28,8 +27,7 @@ pub(super) fn closed(
     origin: &Point,
     config: &config::Appearance,
 ) -> SurfaceMesh {
-    let parts: Vec<OrientedBox> =
-        twin.furniture.iter().flat_map(|f| boxes::of_part(&f.part, State::Closed, config.slab_m)).collect();
+    let parts: Vec<OrientedBox> = twin.furniture.iter().flat_map(|f| boxes::fronts(&f.part, config.slab_m)).collect();
     let (edges, ways) = open_edges(&mesh);
     let mut more = Vec::new();
     for rim in rims(&edges) {
@@ -49,11 +47,6 @@ pub(super) fn closed(
     }
     mesh.triangles.extend(more);
     mesh
-}
-
-fn holds(shape: &OrientedBox, p: &Point) -> bool {
-    let local = shape.rotation.transpose() * (p - shape.center);
-    local.iter().zip(shape.half.iter()).all(|(l, h)| l.abs() <= *h)
 }
 
 /// Vertex to vertex along the rims of what is missing, the surface on the right; and which way the surface looks there.

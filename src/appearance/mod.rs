@@ -79,6 +79,7 @@ pub fn look(
     // Shards first: they have rims all around.
     let surface = surface_mesh::without_shards(surface_mesh::surface(&volume), config.shard_m2);
     let surface = clean::without_frays(surface, &volume, config);
+    let surface = clean::without_fronts(surface, twin, &origin, config);
     let surface = holes::closed(surface, &volume, twin, &origin, config);
     let voxel = volume.voxel;
     drop(volume);
