@@ -10,7 +10,7 @@ use super::door::Door;
 use super::many::Given;
 use super::output::{Kind, Output};
 use super::progress::Steps;
-use super::words::{self as model, Asked, WordsArgs};
+use super::words::{self as model, Asked, Exchange, WordsArgs};
 use super::{Answer, ConfigFile, Opening, cache, keep, print, shown};
 use crate::config::Config;
 use crate::export::{ExportFormat, FORMATS, Purpose};
@@ -24,6 +24,7 @@ use crate::report::table::aligned;
 use crate::report::{drawings, files, page, page_frames, phrases};
 use crate::twin::Twin;
 use crate::validation::{Validation, Verdict};
+use crate::vlm::Usage;
 use crate::{fitting, primitives};
 
 #[derive(Debug, Args)]
@@ -141,125 +142,179 @@ pub fn make(
     asked: Option<&Asked>,
 ) -> anyhow::Result<Answer> {
     let begin = Instant::now();
-    for (kept, what, option) in
-        [(asked.and_then(Asked::answers), "answers", "--answers"), (given.cache, "looks", "--cache")]
-    {
-        if let Some(kept) = kept
-            && std::path::absolute(kept)?.starts_with(std::path::absolute(out)?)
-        {
-            let [kept, out] = [kept, out].map(shown);
-            bail!("{kept}: {what} kept there would go when {out} is replaced; choose another {option}");
-        }
-    }
+    refuse_within(out, asked.and_then(Asked::answers), "answers", "--answers")?;
+    refuse_within(out, given.cache, "looks", "--cache")?;
     let inputs: Vec<&Path> = given.recordings.iter().map(PathBuf::as_path).collect();
     let output = Output::new(out, Kind::Twin, &inputs)?;
     let steps = Steps::new();
     let recording = given.open(config, &steps)?;
     let store = cache::open(given.cache, config)?;
     let how = model::How { config, asked, store: &*store, keep: wishes.steps };
-    let model::Inferred { mut scene, reasoner, usage, exchanges, lost: unread } =
-        model::infer(&recording, how, &steps)?;
-    super::infer::weigh(&mut scene, &recording, config, &steps);
-    steps.report("fitting boxes", 0, 1);
-    let twin = fitting::fit(&scene, &recording.up(), &config.fitting, &config.priors);
-    steps.report("simulating", 0, 1);
-    let hands = make::joint_hands(&scene, &twin);
-    let (validation, mut lost) = make::replay(&twin, &hands, &recording.up(), &config.validation)?;
-    let look = match wishes.textures {
-        true => match looked(&recording, &scene, &twin, config, &steps) {
-            Ok((look, unseen)) => {
-                lost.extend(unseen.into_iter().filter(|why| !unread.contains(why)));
-                look
-            }
-            Err(error) => {
-                lost.push(format!("textures: {error}"));
-                None
-            }
-        },
-        false => None,
-    };
+    let inferred = model::infer(&recording, how, &steps)?;
+    let mut built = Built::of(&recording, inferred, config, wishes, &steps)?;
     steps.report("writing", 0, 1);
-    let glb = models(&output, &twin, look.as_ref(), &validation)?;
-    output.write("articulations.json", files::articulations(&scene, &reasoner)?)?;
-    let rows = files::predictions(&scene, &twin);
-    output.write("predictions.json", json::text(&rows)?)?;
-    output.write("twin.json", json::text(&twin)?)?;
-    output.write("validation.json", json::text(&validation)?)?;
-    let verdicts = validation.words();
-    let seen = super::primitives::seen(&hands, &verdicts, &rows);
-    let moves = primitives::of(&twin, &seen, &config.hands.grips, &config.primitives);
-    output.write("primitives.json", json::text(&moves)?)?;
-    for (furniture, check) in twin.furniture.iter().zip(&validation.joints) {
-        output.write(&format!("proof/{}.svg", file_name(&check.id)), drawings::proof(furniture, check))?;
-    }
-    output.write("trajectories.json", json::text(&hands)?)?;
-    output.write("config.toml", config.to_toml())?;
+    let glb = built.write(&output, config)?;
     let folders: Vec<String> = given.recordings.iter().map(|dir| shown(dir)).collect();
     let command = format!("paws twin {} --out {}", folders.join(" "), shown(out));
-    let is_there = |note: &FileNote| match note.name {
-        "steps/" => wishes.steps,
-        LOOK => look.is_some(),
-        _ => true,
-    };
-    let notes: Vec<FileNote> = file_notes().into_iter().filter(is_there).collect();
-    let mut pictured = Vec::new();
-    if wishes.textures {
-        match make::forgiving(&recording, &config.pictures, |r| page_frames::frames(r, &scene, &twin, config)) {
-            Ok((frames, unseen)) => {
-                pictured = frames;
-                let told: Vec<String> = unread.iter().chain(&lost).cloned().collect();
-                lost.extend(unseen.into_iter().filter(|why| !told.contains(why)));
-            }
-            Err(error) => lost.push(format!("recorded frames of the page: {error}")),
-        }
-    }
-    let origins = origin::read(&recording.dir);
-    let around = PageContext { command: &command, files: &notes, frames: &pictured, origins: &origins };
-    output.write("index.html", page::render(&scene, &twin, &validation, &glb, &around)?)?;
+    output.write("index.html", built.page(&recording, &command, &glb, config, wishes)?)?;
     if wishes.steps {
-        lost.extend(keep::write(&recording, &scene, &twin, &exchanges, &output));
+        let Built { scene, twin, exchanges, .. } = &built;
+        let unwritten = keep::write(&recording, scene, twin, exchanges, &output);
+        built.lost.extend(unwritten);
     }
     output.finish()?;
     let times = steps.finish();
-
-    print(&summary(&scene, &twin, &validation))?;
     let times: Vec<String> = times.iter().map(|(s, t)| format!("{s} {:.2} s", t.as_secs_f64())).collect();
-    for why in &lost {
-        eprintln!("not done: {why}");
-    }
-    let damaged = usage.as_ref().is_some_and(|u| !u.damaged.is_empty());
-    if let Some((asked, usage)) = asked.zip(usage) {
-        eprintln!("{}", usage.sentence(asked.model()));
-    }
-    eprintln!("{:.2} s ({})", begin.elapsed().as_secs_f64(), times.join(", "));
-    print(&format!(
-        "\nlook:  {}   (the scene in 3D, every verdict with its reason)\n",
-        shown(&out.join("index.html"))
-    ))?;
-    print(&format!(
-        "use:   {}   {}   {}   {}\n",
-        shown(&out.join("scene.urdf")),
-        shown(&out.join("scene.xml")),
-        shown(&out.join("scene.glb")),
-        shown(&out.join("scene.usda"))
-    ))?;
-    let refuted = validation.joints.iter().any(|j| j.verdict == Verdict::Fail);
-    let all_joined = scene.videos.left_out.is_empty();
-    let read_whole = unread.is_empty() && recording.left_out == LeftOut::default();
-    let whole = lost.is_empty() && read_whole && twin.left_out.is_empty() && !damaged && all_joined;
-    Ok(if refuted || twin.furniture.is_empty() || !whole { Answer::No } else { Answer::Yes })
+    built.tell(out, asked, &format!("{:.2} s ({})", begin.elapsed().as_secs_f64(), times.join(", ")))?;
+    Ok(built.answer(&recording))
 }
 
-/// What the twin looks like. An error costs the look, not the twin: everything else is written without it.
-fn looked(
-    recording: &Recording,
-    scene: &Scene,
-    twin: &Twin,
-    config: &Config,
-    steps: &Steps,
-) -> crate::error::Result<(Option<Look>, Vec<String>)> {
-    steps.report("textures", 0, 1);
-    make::look(recording, scene, twin, config)
+/// Refuses to replace a folder in which something is kept for later runs.
+fn refuse_within(out: &Path, kept: Option<&Path>, what: &str, option: &str) -> anyhow::Result<()> {
+    if let Some(kept) = kept
+        && std::path::absolute(kept)?.starts_with(std::path::absolute(out)?)
+    {
+        let [kept, out] = [kept, out].map(shown);
+        bail!("{kept}: {what} kept there would go when {out} is replaced; choose another {option}");
+    }
+    Ok(())
+}
+
+/// All that is written of a recording.
+struct Built {
+    scene: Scene,
+    /// Who answered.
+    reasoner: String,
+    /// What a model was asked, where one is.
+    usage: Option<Usage>,
+    exchanges: Vec<Exchange>,
+    /// Pictures that could not be read.
+    unread: Vec<String>,
+    twin: Twin,
+    hands: Vec<make::JointHands>,
+    validation: Validation,
+    look: Option<Look>,
+    /// What could not be done, a sentence each.
+    lost: Vec<String>,
+}
+
+impl Built {
+    /// Fits, replays and, where it is wished, dresses the twin. An error costs the look, not the twin.
+    fn of(
+        recording: &Recording,
+        inferred: model::Inferred,
+        config: &Config,
+        wishes: Wishes,
+        steps: &Steps,
+    ) -> anyhow::Result<Self> {
+        let model::Inferred { mut scene, reasoner, usage, exchanges, lost: unread } = inferred;
+        super::infer::weigh(&mut scene, recording, config, steps);
+        steps.report("fitting boxes", 0, 1);
+        let twin = fitting::fit(&scene, &recording.up(), &config.fitting, &config.priors);
+        steps.report("simulating", 0, 1);
+        let hands = make::joint_hands(&scene, &twin);
+        let (validation, lost) = make::replay(&twin, &hands, &recording.up(), &config.validation)?;
+        let look = None;
+        let mut built = Self { scene, reasoner, usage, exchanges, unread, twin, hands, validation, look, lost };
+        if wishes.textures {
+            steps.report("textures", 0, 1);
+            let look = make::look(recording, &built.scene, &built.twin, config);
+            built.look = built.kept(look, "textures").flatten();
+        }
+        Ok(built)
+    }
+
+    /// What a step for eyes alone gives; what it lost, or why it gives nothing, is noted once.
+    fn kept<T>(&mut self, made: crate::error::Result<(T, Vec<String>)>, step: &str) -> Option<T> {
+        match made {
+            Ok((made, unseen)) => {
+                let is_new = |why: &String| !self.unread.contains(why) && !self.lost.contains(why);
+                let new: Vec<String> = unseen.into_iter().filter(is_new).collect();
+                self.lost.extend(new);
+                Some(made)
+            }
+            Err(error) => {
+                self.lost.push(format!("{step}: {error}"));
+                None
+            }
+        }
+    }
+
+    /// Writes all files but the page and the steps; returns the model for viewers.
+    fn write(&self, output: &Output, config: &Config) -> anyhow::Result<Vec<u8>> {
+        let Self { scene, reasoner, twin, hands, validation, look, .. } = self;
+        let glb = models(output, twin, look.as_ref(), validation)?;
+        output.write("articulations.json", files::articulations(scene, reasoner)?)?;
+        let rows = files::predictions(scene, twin);
+        output.write("predictions.json", json::text(&rows)?)?;
+        output.write("twin.json", json::text(twin)?)?;
+        output.write("validation.json", json::text(validation)?)?;
+        let verdicts = validation.words();
+        let seen = super::primitives::seen(hands, &verdicts, &rows);
+        let moves = primitives::of(twin, &seen, &config.hands.grips, &config.primitives);
+        output.write("primitives.json", json::text(&moves)?)?;
+        for (furniture, check) in twin.furniture.iter().zip(&validation.joints) {
+            output.write(&format!("proof/{}.svg", file_name(&check.id)), drawings::proof(furniture, check))?;
+        }
+        output.write("trajectories.json", json::text(hands)?)?;
+        output.write("config.toml", config.to_toml())?;
+        Ok(glb)
+    }
+
+    /// The page to look at, with recorded frames beside the twin where textures are wished.
+    fn page(
+        &mut self,
+        recording: &Recording,
+        command: &str,
+        glb: &[u8],
+        config: &Config,
+        wishes: Wishes,
+    ) -> anyhow::Result<String> {
+        let is_there = |note: &FileNote| match note.name {
+            "steps/" => wishes.steps,
+            LOOK => self.look.is_some(),
+            _ => true,
+        };
+        let notes: Vec<FileNote> = file_notes().into_iter().filter(is_there).collect();
+        let mut frames = Vec::new();
+        if wishes.textures {
+            let seen = make::forgiving(recording, &config.pictures, |recording| {
+                page_frames::frames(recording, &self.scene, &self.twin, config)
+            });
+            frames = self.kept(seen, "recorded frames of the page").unwrap_or_default();
+        }
+        let origins = origin::read(&recording.dir);
+        let around = PageContext { command, files: &notes, frames: &frames, origins: &origins };
+        Ok(page::render(&self.scene, &self.twin, &self.validation, glb, &around)?)
+    }
+
+    /// What a person reads in the terminal. `times`: how long all of it took.
+    fn tell(&self, out: &Path, asked: Option<&Asked>, times: &str) -> anyhow::Result<()> {
+        print(&summary(&self.scene, &self.twin, &self.validation))?;
+        for why in &self.lost {
+            eprintln!("not done: {why}");
+        }
+        if let Some((asked, usage)) = asked.zip(self.usage.as_ref()) {
+            eprintln!("{}", usage.sentence(asked.model()));
+        }
+        eprintln!("{times}");
+        let page = shown(&out.join("index.html"));
+        print(&format!("\nlook:  {page}   (the scene in 3D, every verdict with its reason)\n"))?;
+        let [urdf, mjcf, gltf, usd] =
+            ["scene.urdf", "scene.xml", "scene.glb", "scene.usda"].map(|name| shown(&out.join(name)));
+        print(&format!("use:   {urdf}   {mjcf}   {gltf}   {usd}\n"))
+    }
+
+    /// Whether all was read and built, and nothing of it is refuted.
+    fn answer(&self, recording: &Recording) -> Answer {
+        let Self { scene, usage, unread, twin, validation, lost, .. } = self;
+        let is_refuted = validation.joints.iter().any(|j| j.verdict == Verdict::Fail);
+        let is_damaged = usage.as_ref().is_some_and(|u| !u.damaged.is_empty());
+        let read_whole = unread.is_empty() && recording.left_out == LeftOut::default() && !is_damaged;
+        let all_joined = scene.videos.left_out.is_empty();
+        let is_whole = lost.is_empty() && read_whole && twin.left_out.is_empty() && all_joined;
+        if is_refuted || twin.furniture.is_empty() || !is_whole { Answer::No } else { Answer::Yes }
+    }
 }
 
 /// Writes the twin in all formats; returns the file for viewers.

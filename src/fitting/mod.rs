@@ -16,7 +16,7 @@ mod turned;
 use nalgebra::Matrix3;
 
 use crate::articulation::{Articulation, JointKind};
-use crate::config::{self, Priors};
+use crate::config::{self, Boards, Priors};
 use crate::geometry::{Face, Rect, fronts};
 use crate::hands::Trajectory;
 use crate::math::{Vector, reject, unit};
@@ -312,44 +312,20 @@ fn build(plan: &Plan, depth: f64, rules: Rules) -> Furniture {
     let mut solids = vec![solid("front", Role::Front, [front_r, front_u, [-board, 0.0]], plan.seen)];
     solids.extend(handle(plan, [front_r, front_u], rules, &solid));
 
-    let carcass_out = [-depth, -board - gap];
     let slide = plan.articulation.kind == JointKind::Prismatic;
     // How far the part can go at all.
     let mut most = std::f64::consts::PI;
     // A sliding door runs along its face and has no tray behind it.
     if limits::comes_out(&plan.articulation, face) {
-        let tray = [-(depth - board - 2.0 * gap), -board];
-        let inner_r = [r[0] + board + 2.0 * gap, r[1] - board - 2.0 * gap];
-        // A tray's walls are lower than its front.
-        let inner_u = {
-            let (low, free) = (u[0] + board + 2.0 * gap, u[1] - u[0] - 2.0 * board - 4.0 * gap);
-            [low, low + priors.boards.tray_height_share * free]
-        };
-        if inner_r[1] - inner_r[0] > 4.0 * board && inner_u[1] - inner_u[0] > 2.0 * board {
-            let thin = priors.boards.tray_thickness_m;
-            solids.push(solid("tray_left", Role::Tray, [[inner_r[0], inner_r[0] + thin], inner_u, tray], false));
-            solids.push(solid("tray_right", Role::Tray, [[inner_r[1] - thin, inner_r[1]], inner_u, tray], false));
-            let between = [inner_r[0] + thin, inner_r[1] - thin];
-            solids.push(solid("tray_bottom", Role::Tray, [between, [inner_u[0], inner_u[0] + thin], tray], false));
-            let above = [inner_u[0] + thin, inner_u[1]];
-            solids.push(solid("tray_back", Role::Tray, [between, above, [tray[0], tray[0] + thin]], false));
-        }
-        most = tray[1] - tray[0];
+        let out = [-(depth - board - 2.0 * gap), -board];
+        solids.extend(tray([r, u, out], &priors.boards, &solid));
+        most = out[1] - out[0];
     } else if slide {
         // A sliding door stays in its frame.
         let axis = plan.articulation.axis;
         most = axis.dot(&face.right).abs() * (r[1] - r[0]) + axis.dot(&face.up).abs() * (u[1] - u[0]);
     }
-    let deep = carcass_out[0];
-    let between_r = [r[0] + board, r[1] - board];
-    let between_u = [u[0] + board, u[1] - board];
-    let mut carcass = vec![
-        solid("carcass_left", Role::Carcass, [[r[0], r[0] + board], u, carcass_out], false),
-        solid("carcass_right", Role::Carcass, [[r[1] - board, r[1]], u, carcass_out], false),
-        solid("carcass_bottom", Role::Carcass, [between_r, [u[0], u[0] + board], carcass_out], false),
-        solid("carcass_top", Role::Carcass, [between_r, [u[1] - board, u[1]], carcass_out], false),
-        solid("carcass_back", Role::Carcass, [between_r, between_u, [deep, deep + board]], false),
-    ];
+    let mut carcass = carcass([r, u, [-depth, -board - gap]], board, &solid);
     carcass.retain(|s| s.shape.half.iter().all(|h| *h > config.least_board_half_m));
 
     let (damping, friction) = if slide {
@@ -395,13 +371,44 @@ fn build(plan: &Plan, depth: f64, rules: Rules) -> Furniture {
     }
 }
 
+/// A board by name, role and bounds along right, up and out of the face, and whether it was seen.
+type Board<'a> = &'a dyn Fn(&str, Role, [[f64; 2]; 3], bool) -> Solid;
+
+/// The boards of a drawer behind its front; none where they would not fit. `r`, `u`: bounds of the front; `out`: of the tray.
+fn tray([r, u, out]: [[f64; 2]; 3], boards: &Boards, solid: Board) -> Vec<Solid> {
+    let Boards { thickness_m: board, gap_m: gap, tray_thickness_m: thin, tray_height_share, .. } = *boards;
+    let inner_r = [r[0] + board + 2.0 * gap, r[1] - board - 2.0 * gap];
+    // A tray's walls are lower than its front.
+    let (low, free) = (u[0] + board + 2.0 * gap, u[1] - u[0] - 2.0 * board - 4.0 * gap);
+    let inner_u = [low, low + tray_height_share * free];
+    if inner_r[1] - inner_r[0] <= 4.0 * board || inner_u[1] - inner_u[0] <= 2.0 * board {
+        return Vec::new();
+    }
+    let between = [inner_r[0] + thin, inner_r[1] - thin];
+    let above = [inner_u[0] + thin, inner_u[1]];
+    vec![
+        solid("tray_left", Role::Tray, [[inner_r[0], inner_r[0] + thin], inner_u, out], false),
+        solid("tray_right", Role::Tray, [[inner_r[1] - thin, inner_r[1]], inner_u, out], false),
+        solid("tray_bottom", Role::Tray, [between, [inner_u[0], inner_u[0] + thin], out], false),
+        solid("tray_back", Role::Tray, [between, above, [out[0], out[0] + thin]], false),
+    ]
+}
+
+/// The five boards around what a front closes.
+fn carcass([r, u, out]: [[f64; 2]; 3], board: f64, solid: Board) -> Vec<Solid> {
+    let between_r = [r[0] + board, r[1] - board];
+    let between_u = [u[0] + board, u[1] - board];
+    vec![
+        solid("carcass_left", Role::Carcass, [[r[0], r[0] + board], u, out], false),
+        solid("carcass_right", Role::Carcass, [[r[1] - board, r[1]], u, out], false),
+        solid("carcass_bottom", Role::Carcass, [between_r, [u[0], u[0] + board], out], false),
+        solid("carcass_top", Role::Carcass, [between_r, [u[1] - board, u[1]], out], false),
+        solid("carcass_back", Role::Carcass, [between_r, between_u, [out[0], out[0] + board]], false),
+    ]
+}
+
 /// A bar on two posts where the hand was; upright beside an upright hinge, level otherwise.
-fn handle(
-    plan: &Plan,
-    bounds: [[f64; 2]; 2],
-    rules: Rules,
-    solid: &impl Fn(&str, Role, [[f64; 2]; 3], bool) -> Solid,
-) -> Vec<Solid> {
+fn handle(plan: &Plan, bounds: [[f64; 2]; 2], rules: Rules, solid: Board) -> Vec<Solid> {
     let upright = plan.articulation.kind == JointKind::Revolute
         && plan.articulation.axis.dot(&plan.face.up).abs() > plan.articulation.axis.dot(&plan.face.right).abs();
     let along = usize::from(upright);

@@ -221,31 +221,10 @@ pub fn trajectory(
         return Outcome::Abstained(format!("{none} in contact ({in_clip} seen in the clip)"));
     };
     // Without a flag the samples are the narration's, which knows neither end.
-    let ends_seen = if hold.is_none() && (!flagged || (use_contact && score == 0)) {
-        [false; 2]
-    } else {
-        let time = |s: &HandSample| recording.frames[s.frame].timestamp_secs;
-        let all = samples_of(side, from.saturating_sub(1), to + 1);
-        let (first, last) = (held[0], held[held.len() - 1]);
-        [
-            all.iter().any(|s| s.frame < first.frame && time(first) - time(s) <= config.seen_secs),
-            all.iter().any(|s| s.frame > last.frame && time(s) - time(last) <= config.seen_secs),
-        ]
-    };
-    let times: Vec<f64> = held.iter().map(|s| recording.frames[s.frame].timestamp_secs).collect();
-    let observed: Vec<Point> = held.iter().map(|s| s.grasp()).collect();
-    let smoothed = kalman::smooth(&times, &observed, &filter(config));
-    let samples: Vec<Sample> = held
-        .iter()
-        .enumerate()
-        .map(|(i, s)| Sample {
-            frame: s.frame,
-            time_secs: times[i],
-            observed: observed[i],
-            smoothed: smoothed.positions[i],
-            accepted: smoothed.accepted[i],
-        })
-        .collect();
+    let knows_ends = hold.is_some() || (flagged && !(use_contact && score == 0));
+    let around = samples_of(side, from.saturating_sub(1), to + 1);
+    let ends_seen = if knows_ends { seen_beside(recording, &held, &around, config.seen_secs) } else { [false; 2] };
+    let samples = smoothed(recording, &held, config);
     // A rejected sample at an end is held in place by nothing: the ends are where the grip is read off.
     let believed = |s: &Sample| s.accepted;
     let (Some(from), Some(to)) = (samples.iter().position(believed), samples.iter().rposition(believed)) else {
@@ -262,6 +241,32 @@ pub fn trajectory(
         Ok(()) => Outcome::Found(trajectory),
         Err(fault) => Outcome::Abstained(format!("the hand cannot be followed: {fault}")),
     }
+}
+
+/// Whether a hand was seen within so many seconds before the first and after the last of the samples that hold something.
+/// `around`: its samples then. `held` is not empty.
+fn seen_beside(recording: &Recording, held: &[&HandSample], around: &[&HandSample], secs: f64) -> [bool; 2] {
+    let time = |s: &HandSample| recording.frames[s.frame].timestamp_secs;
+    let (first, last) = (held[0], held[held.len() - 1]);
+    [
+        around.iter().any(|s| s.frame < first.frame && time(first) - time(s) <= secs),
+        around.iter().any(|s| s.frame > last.frame && time(s) - time(last) <= secs),
+    ]
+}
+
+/// The path of the fingertips after gate and smoother (§A.2).
+fn smoothed(recording: &Recording, held: &[&HandSample], config: &config::Hands) -> Vec<Sample> {
+    let times: Vec<f64> = held.iter().map(|s| recording.frames[s.frame].timestamp_secs).collect();
+    let observed: Vec<Point> = held.iter().map(|s| s.grasp()).collect();
+    let smoothed = kalman::smooth(&times, &observed, &filter(config));
+    let sample = |(i, s): (usize, &&HandSample)| Sample {
+        frame: s.frame,
+        time_secs: times[i],
+        observed: observed[i],
+        smoothed: smoothed.positions[i],
+        accepted: smoothed.accepted[i],
+    };
+    held.iter().enumerate().map(sample).collect()
 }
 
 /// The filter of §A.2 with the gate of its p-value.

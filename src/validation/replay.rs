@@ -70,6 +70,32 @@ pub struct Replay {
 }
 
 impl Replay {
+    /// Before the first step.
+    fn standing(opening: f64, grip: Point) -> Self {
+        Self {
+            rms_m: 0.0,
+            max_m: 0.0,
+            along_m: 0.0,
+            across_m: 0.0,
+            peak_force_n: 0.0,
+            peak_effort: 0.0,
+            start: opening,
+            reached: [opening, opening],
+            limit_steps: [0, 0],
+            return_error: 0.0,
+            contacts: Vec::new(),
+            closed_overlaps: Vec::new(),
+            kinetic_max_j: 0.0,
+            work_max_j: 0.0,
+            drift_m: 0.0,
+            trace: Vec::new(),
+            hand: Vec::new(),
+            handle: Vec::new(),
+            grip,
+            untrusted: None,
+        }
+    }
+
     /// The deepest that the part was inside anything, metres, and inside what.
     #[must_use]
     pub fn worst_penetration(&self) -> Option<(f64, &str)> {
@@ -97,15 +123,7 @@ pub fn simulate(
     drive: &Drive,
     config: &config::Validation,
 ) -> Result<Replay> {
-    let (Some(&first), Some(&end)) = (drive.path.first(), drive.times_secs.last()) else {
-        return Err(Error::Simulation(format!("{}: an empty path", part.id)));
-    };
-    if !(0.0..=config.longest_secs).contains(&end) {
-        return Err(Error::Simulation(format!(
-            "{}: the recorded hand takes {end:.3e} s; time stamps must be seconds and must not go back",
-            part.id
-        )));
-    }
+    let (first, end) = beginning_and_end(part, drive, config)?;
     let dt = config.step_secs;
     let start = joint.opening_at(&drive.grip, &first).clamp(0.0, upper);
     let properties = mass_properties(&part.solids, around.density);
@@ -130,28 +148,8 @@ pub fn simulate(
     let height_at_start = height(&world);
     let mut hand_work = 0.0;
 
-    let mut out = Replay {
-        rms_m: 0.0,
-        max_m: 0.0,
-        along_m: 0.0,
-        across_m: 0.0,
-        peak_force_n: 0.0,
-        peak_effort: 0.0,
-        start,
-        reached: [start, start],
-        limit_steps: [0, 0],
-        return_error: 0.0,
-        contacts: Vec::new(),
-        closed_overlaps: world.closed_overlaps(),
-        kinetic_max_j: 0.0,
-        work_max_j: 0.0,
-        drift_m: 0.0,
-        trace: Vec::new(),
-        hand: Vec::new(),
-        handle: Vec::new(),
-        grip: drive.grip,
-        untrusted: None,
-    };
+    let mut out = Replay { closed_overlaps: world.closed_overlaps(), ..Replay::standing(start, drive.grip) };
+    // Squared distances of the handle from the hand: all of it, and along the axis.
     let (mut sum, mut sum_along, mut counted) = (0.0, 0.0, 0usize);
     let mut fastest: f64 = 0.0;
     let mut opening = start;
@@ -216,6 +214,20 @@ pub fn simulate(
     out.return_error = if drive.back { opening - start } else { 0.0 };
     out.contacts = world.contacts();
     Ok(out)
+}
+
+/// Where a path begins, world, and how long it takes, seconds.
+fn beginning_and_end(part: &Part, drive: &Drive, config: &config::Validation) -> Result<(Point, f64)> {
+    let (Some(&first), Some(&end)) = (drive.path.first(), drive.times_secs.last()) else {
+        return Err(Error::Simulation(format!("{}: an empty path", part.id)));
+    };
+    if !(0.0..=config.longest_secs).contains(&end) {
+        return Err(Error::Simulation(format!(
+            "{}: the recorded hand takes {end:.3e} s; time stamps must be seconds and must not go back",
+            part.id
+        )));
+    }
+    Ok((first, end))
 }
 
 /// The inertia (kg m^2 about a hinge, kg along a slide) that a joint lacks for a hand that is felt once a step: fingers that

@@ -314,84 +314,21 @@ fn judge(
     resolves: Option<Resolution>,
     config: &config::Validation,
 ) -> JointCheck {
-    let kind = part.joint.articulation.kind;
     // A simulation that blew up says nothing about the joint.
     let trusted: Vec<&ClipCheck> = clips.iter().filter(|c| c.replay.untrusted.is_none()).collect();
     let errors: Vec<f64> = trusted.iter().map(|c| c.replay.rms_m).collect();
     let rms_m = stats::median(&errors).unwrap_or(0.0);
-    let range = clips.iter().map(|c| c.observed_range).fold(0.0, f64::max);
     let best = rivals.first();
-    let mut faults: Vec<String> = Vec::new();
-    if let Some(rival) = ahead(&rivals, config) {
-        faults.push(if rival.name == REVERSED {
-            "the recorded hand opens it the other way".to_owned()
-        } else {
-            let own = pooled_over(&clips);
-            format!(
-                "a {} explains the recorded hand better: to {} instead of {}",
-                rival.name,
-                centimetres(rival.distance_m),
-                centimetres(own)
-            )
-        });
-    }
     let blocked = trusted.iter().filter_map(|c| blocked(part, c, config)).max_by(|a, b| a.0.total_cmp(&b.0));
-    let assumed = is_assumed(part);
-    let runs_into = blocked.as_ref().filter(|_| assumed).map(|(_, why)| why.clone());
-    faults.extend(blocked.filter(|_| !assumed).map(|(_, why)| why));
-    let off = trusted.iter().filter(|c| cannot_follow(c, config)).count();
-    if 2 * off > trusted.len() {
-        faults.push(format!("the handle stays {} (RMS) away from the recorded hand", centimetres(rms_m)));
-    }
-    let margin_nats = best.map(|r| r.margin_nats);
+    let blocked = blocked.map(|(_, why)| why);
+    let found = Findings { part, clips: &clips, trusted: &trusted, best, rms_m, blocked, config };
+    let faults = found.faults(ahead(&rivals, config));
     let (verdict, reason) = if !faults.is_empty() {
         (Verdict::Fail, faults.join("; "))
-    } else if clips.is_empty() {
-        (Verdict::Undetermined, "no recorded hand to replay".to_owned())
-    } else if let Some(why) = blew_up(&clips).filter(|_| 2 * trusted.len() <= clips.len()) {
-        (Verdict::Undetermined, format!("the simulation is not to be trusted here, because {why}"))
-    } else if rms_m > config.pass_rms_m {
-        let noises: Vec<f64> = clips.iter().map(|c| c.noise_m).collect();
-        let noise = stats::median(&noises).unwrap_or(0.0);
-        let text = if noise > config.pass_rms_m {
-            format!("the recorded hand trembles by {}: no joint could be told from it", centimetres(noise))
-        } else {
-            format!("follows the recorded hand only to {}: hinge or hand are off", centimetres(rms_m))
-        };
-        (Verdict::Undetermined, text)
-    } else if let Some(rival) = best.filter(|r| r.margin_nats < config.margin_nats) {
-        let text = if clips.iter().map(way).fold(0.0, f64::max) < config.glimpse_m {
-            "the hand was seen for a moment only: no motion to replay".to_owned()
-        } else if rival.margin_nats >= 0.0 {
-            format!("over {} a {} would look about the same", amount(kind, range), rival.name)
-        } else {
-            format!("over {} a {} looks better, but not by enough to decide", amount(kind, range), rival.name)
-        };
-        (Verdict::Undetermined, text)
-    } else if let Some(p) = part.joint.probability.filter(|p| log_odds(*p) < config.margin_nats) {
-        let text = format!(
-            "follows the recorded hand to {}, but after all evidence other joints keep a share of {:.0} %",
-            centimetres(rms_m),
-            100.0 * (1.0 - p)
-        );
-        (Verdict::Undetermined, text)
-    } else if assumed {
-        let text = match runs_into {
-            Some(why) => format!("its front is assumed, and so is what stands around it: {why}"),
-            None => format!(
-                "follows the recorded hand to {} over {}, but its front is assumed: nothing was seen of it",
-                centimetres(rms_m),
-                amount(kind, range)
-            ),
-        };
-        (Verdict::Undetermined, text)
+    } else if let Some(why) = found.undecided() {
+        (Verdict::Undetermined, why)
     } else {
-        let rivals = best.map_or(String::new(), |r| {
-            format!("; the best rival, a {}, is {} as likely", r.name, one_in(r.margin_nats))
-        });
-        let sees = resolves.map_or(String::new(), |r| format!("; {}", sees(kind, &r)));
-        let text = format!("follows the recorded hand to {} over {}", centimetres(rms_m), amount(kind, range));
-        (Verdict::Pass, format!("{text}{rivals}{sees}"))
+        (Verdict::Pass, found.proof(resolves.as_ref()))
     };
     let share = |c: &ClipCheck| reached(c) / c.observed_range.max(1e-6);
     JointCheck {
@@ -401,10 +338,110 @@ fn judge(
         rms_m,
         peak_force_n: trusted.iter().map(|c| c.replay.peak_force_n).fold(0.0, f64::max),
         reached_share: trusted.iter().copied().map(share).fold(1.0, f64::min),
-        margin_nats,
+        margin_nats: best.map(|r| r.margin_nats),
         resolves,
         rivals,
         clips,
+    }
+}
+
+/// What a joint is judged by.
+struct Findings<'a> {
+    part: &'a Part,
+    clips: &'a [ClipCheck],
+    /// Those whose simulation did not blow up.
+    trusted: &'a [&'a ClipCheck],
+    /// The best rival.
+    best: Option<&'a RivalCheck>,
+    /// Median tracking error, metres.
+    rms_m: f64,
+    /// What the part runs into.
+    blocked: Option<String>,
+    config: &'a config::Validation,
+}
+
+impl Findings<'_> {
+    /// Why simulation refutes the joint. `ahead`: a rival that explains the hands better.
+    fn faults(&self, ahead: Option<&RivalCheck>) -> Vec<String> {
+        let mut faults: Vec<String> = Vec::new();
+        if let Some(rival) = ahead {
+            faults.push(if rival.name == REVERSED {
+                "the recorded hand opens it the other way".to_owned()
+            } else {
+                let own = pooled_over(self.clips);
+                format!(
+                    "a {} explains the recorded hand better: to {} instead of {}",
+                    rival.name,
+                    centimetres(rival.distance_m),
+                    centimetres(own)
+                )
+            });
+        }
+        faults.extend(self.blocked.clone().filter(|_| !is_assumed(self.part)));
+        let off = self.trusted.iter().filter(|c| cannot_follow(c, self.config)).count();
+        if 2 * off > self.trusted.len() {
+            faults.push(format!("the handle stays {} (RMS) away from the recorded hand", centimetres(self.rms_m)));
+        }
+        faults
+    }
+
+    /// Why the recording cannot decide, where nothing refutes the joint.
+    fn undecided(&self) -> Option<String> {
+        let Self { part, clips, trusted, config, rms_m, .. } = *self;
+        if clips.is_empty() {
+            return Some("no recorded hand to replay".to_owned());
+        }
+        if let Some(why) = blew_up(clips).filter(|_| 2 * trusted.len() <= clips.len()) {
+            return Some(format!("the simulation is not to be trusted here, because {why}"));
+        }
+        if rms_m > config.pass_rms_m {
+            let noises: Vec<f64> = clips.iter().map(|c| c.noise_m).collect();
+            let noise = stats::median(&noises).unwrap_or(0.0);
+            return Some(if noise > config.pass_rms_m {
+                format!("the recorded hand trembles by {}: no joint could be told from it", centimetres(noise))
+            } else {
+                format!("follows the recorded hand only to {}: hinge or hand are off", centimetres(rms_m))
+            });
+        }
+        if let Some(rival) = self.best.filter(|r| r.margin_nats < config.margin_nats) {
+            return Some(if clips.iter().map(way).fold(0.0, f64::max) < config.glimpse_m {
+                "the hand was seen for a moment only: no motion to replay".to_owned()
+            } else if rival.margin_nats >= 0.0 {
+                format!("over {} a {} would look about the same", self.went(), rival.name)
+            } else {
+                format!("over {} a {} looks better, but not by enough to decide", self.went(), rival.name)
+            });
+        }
+        if let Some(p) = part.joint.probability.filter(|p| log_odds(*p) < config.margin_nats) {
+            return Some(format!(
+                "follows the recorded hand to {}, but after all evidence other joints keep a share of {:.0} %",
+                centimetres(rms_m),
+                100.0 * (1.0 - p)
+            ));
+        }
+        is_assumed(part).then(|| match &self.blocked {
+            Some(why) => format!("its front is assumed, and so is what stands around it: {why}"),
+            None => format!(
+                "follows the recorded hand to {} over {}, but its front is assumed: nothing was seen of it",
+                centimetres(rms_m),
+                self.went()
+            ),
+        })
+    }
+
+    /// What speaks for a joint that passes.
+    fn proof(&self, resolves: Option<&Resolution>) -> String {
+        let rivals = self.best.map_or(String::new(), |r| {
+            format!("; the best rival, a {}, is {} as likely", r.name, one_in(r.margin_nats))
+        });
+        let sees = resolves.map_or(String::new(), |r| format!("; {}", sees(self.part.joint.articulation.kind, r)));
+        format!("follows the recorded hand to {} over {}{rivals}{sees}", centimetres(self.rms_m), self.went())
+    }
+
+    /// How far the part went, in words.
+    fn went(&self) -> String {
+        let range = self.clips.iter().map(|c| c.observed_range).fold(0.0, f64::max);
+        amount(self.part.joint.articulation.kind, range)
     }
 }
 
