@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-const FLOORS: [&[&str]; 21] = [
+const FLOORS: [&[&str]; 22] = [
     &["error"],
     &["json", "math"],
     &["articulation", "vlm"],
-    &["recording", "config"],
+    &["config"],
+    &["recording"],
     &["raster"],
     &["twin", "look", "import"],
     &["model"],
