@@ -3,6 +3,8 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
+
 use super::boxes::{self, holds};
 use super::fuse::Volume;
 use super::local::Local;
@@ -53,17 +55,23 @@ pub(super) fn closed(
 type OpenEdges = (BTreeMap<u32, Vec<u32>>, BTreeMap<[u32; 2], Local>);
 
 fn open_edges(mesh: &SurfaceMesh) -> OpenEdges {
-    let mut directed: Vec<[u32; 2]> = mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
-    directed.sort_unstable();
+    let sides = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]];
+    let key = |[from, to]: [u32; 2]| u64::from(from) << 32 | u64::from(to);
+    let mut directed: Vec<u64> = mesh.triangles.par_iter().flat_map_iter(|t| sides(t).map(key)).collect();
+    directed.par_sort_unstable();
+    let is_open = |&[from, to]: &[u32; 2]| directed.binary_search(&key([to, from])).is_err();
+    let open: Vec<([u32; 2], Local)> = mesh
+        .triangles
+        .par_iter()
+        .flat_map_iter(|triangle| {
+            let way = || mesh.across(triangle).try_normalize(1e-12).unwrap_or_default();
+            sides(triangle).into_iter().filter(is_open).map(move |[from, to]| ([to, from], way()))
+        })
+        .collect();
     let (mut edges, mut ways) = (BTreeMap::<u32, Vec<u32>>::new(), BTreeMap::new());
-    for triangle in &mesh.triangles {
-        let [a, b, c] = *triangle;
-        for [from, to] in [[a, b], [b, c], [c, a]] {
-            if directed.binary_search(&[to, from]).is_err() {
-                edges.entry(to).or_default().push(from);
-                ways.insert([to, from], mesh.across(triangle).try_normalize(1e-12).unwrap_or_default());
-            }
-        }
+    for ([from, to], way) in open {
+        edges.entry(from).or_default().push(to);
+        ways.insert([from, to], way);
     }
     (edges, ways)
 }
